@@ -1,0 +1,1 @@
+"""Clutter categories: plain arrays that say what stands where. No Drake here."""

@@ -1,0 +1,50 @@
+"""Uniform placement of discs in a rectangle without overlap."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lic_drake.errors import ScenarioError
+
+MAX_TRIES = 10_000
+"""Draws for a single disc before the rectangle counts as full."""
+
+
+def place_discs(
+    rng: np.random.Generator,
+    count: int,
+    lower: NDArray[np.float64],
+    upper: NDArray[np.float64],
+    min_distance: float,
+) -> NDArray[np.float64]:
+    """Draws disc centres one after the other, rejecting those too close to earlier ones.
+
+    The rule of the authors' generator (gt-ros-pkg/hrl-haptic-manip, obstacles.py): uniform centres,
+    accepted when no earlier centre is nearer than `min_distance`; goals are not considered.
+
+    Args:
+        rng: Source of the draws.
+        count: Number of discs.
+        lower: Lower corner of the rectangle for the centres, (x, y), metres.
+        upper: Upper corner, (x, y), metres.
+        min_distance: Smallest distance between two centres, metres.
+
+    Returns:
+        Centres, shape (count, 2), metres.
+
+    Raises:
+        ScenarioError: The discs do not fit.
+    """
+    centres = np.empty((count, 2))
+    for i in range(count):
+        for _ in range(MAX_TRIES):
+            candidate = rng.uniform(lower, upper)
+            if np.all(np.sum((centres[:i] - candidate) ** 2, axis=1) >= min_distance**2):
+                centres[i] = candidate
+                break
+        else:
+            area = np.prod(upper - lower)
+            raise ScenarioError(
+                f"only {i} of {count} objects fit into {area:.3g} m^2 at a distance of"
+                f" {min_distance:.3g} m; use fewer or smaller objects or a larger region"
+            )
+    return centres

@@ -1,0 +1,1 @@
+"""Tactile sensing and the quasi-static model predictive controller."""

@@ -1,0 +1,143 @@
+"""The quasi-static one-step model predictive controller of the paper's reference [1].
+
+Model: the arm is in static balance before and after a step, contacts are linear springs along
+their normals. With joint stiffness K, contact stiffness k_c, unit outward normals n_i and contact
+Jacobians J_i, a change dphi of the equilibrium angles moves the joints and forces by
+
+    dtheta = S dphi,  S = (K + sum_i k_c J_i' n_i n_i' J_i)^-1 K
+    dx     = J_E S dphi
+    df_i   = k_c n_i' J_i S dphi
+
+Source of the problem's terms: gt-ros-pkg/hrl-haptic-manip (facts only). No Drake here.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lic_drake.control.mpc_config import MpcConfig
+from lic_drake.control.quadratic_program import QuadraticProgram, solve
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MpcInput:
+    """What the controller knows at a step; m joints, n contacts, all vectors in R.
+
+    Attributes:
+        q: Joint angles theta, shape (m,), radians.
+        q_d: Equilibrium angles phi, shape (m,), radians.
+        p_EG: From the tip to the goal, shape (3,), metres.
+        Jv_E: Translational Jacobian of the tip, shape (3, m).
+        normals: Outward unit normals of the loaded taxels, shape (n, 3).
+        forces: Their normal forces, shape (n,), N, compression positive.
+        Jv_C: Translational Jacobians at the loaded taxels, shape (n, 3, m).
+    """
+
+    q: Vector
+    q_d: Vector
+    p_EG: Vector
+    Jv_E: Vector
+    normals: Vector
+    forces: Vector
+    Jv_C: Vector
+
+
+@dataclass(frozen=True, kw_only=True)
+class Prediction:
+    """Linear maps from dphi to what a step does.
+
+    Attributes:
+        joint: S, shape (m, m).
+        tip: J_E S, shape (3, m), m/rad.
+        force: Rows df_i / dphi, shape (n, m), N/rad.
+    """
+
+    joint: Vector
+    tip: Vector
+    force: Vector
+
+
+class HapticMpc:
+    """One-step MPC of an arm with joint impedance."""
+
+    def __init__(self, config: MpcConfig, stiffness: Vector, q_min: Vector, q_max: Vector) -> None:
+        self.config = config
+        self._stiffness = stiffness
+        self._q_min = q_min
+        self._q_max = q_max
+
+    def step(self, state: MpcInput) -> Vector:
+        """Returns the change of the equilibrium angles, shape (m,), radians.
+
+        Zero when the limits contradict each other: the arm then holds its equilibrium.
+        """
+        dq_d = solve(self.make_problem(state), scale=self.config.tip_step_m)
+        return np.zeros_like(state.q) if dq_d is None else dq_d
+
+    def pull_back(self, q: Vector, q_d: Vector) -> Vector:
+        """Returns equilibrium angles no further than the wind-up reset from the joint angles."""
+        limit = np.deg2rad(self.config.reset_windup_deg)
+        return np.clip(q_d, q - limit, q + limit)
+
+    def predict(self, state: MpcInput) -> Prediction:
+        """Returns the quasi-static model at a state."""
+        contact = self.config.contact_stiffness_N_per_m
+        # Rows n_i' J_i: motion of each contact along its normal.
+        rows = np.einsum("ij,ijk->ik", state.normals, state.Jv_C)
+        K = np.diag(self._stiffness)
+        S = np.linalg.solve(K + contact * rows.T @ rows, K)
+        return Prediction(joint=S, tip=state.Jv_E @ S, force=contact * rows @ S)
+
+    def wanted_tip_motion(self, p_EG: Vector) -> Vector:
+        """Returns the tip motion of this step towards the goal, shape (3,), metres."""
+        distance = float(np.linalg.norm(p_EG))
+        slow = max(self.config.slow_distance_m, self.config.tip_step_m)
+        return p_EG * (self.config.tip_step_m / max(distance, slow))
+
+    def make_problem(self, state: MpcInput) -> QuadraticProgram:
+        """Returns the quadratic program of a step in dphi."""
+        config = self.config
+        model = self.predict(state)
+        over = state.forces > config.force_threshold_N
+
+        weight = config.position_weight
+        P = weight * model.tip.T @ model.tip
+        c = -weight * model.tip.T @ self.wanted_tip_motion(state.p_EG)
+        P = P + config.torque_change_weight * np.diag(self._stiffness**2)
+        if np.any(over):
+            share = np.count_nonzero(over) if config.force_weight_shared else 1
+            rows = model.force[over]
+            P = P + config.force_weight / share * rows.T @ rows
+            c = c + config.force_weight / share * config.force_decrease_N * rows.sum(axis=0)
+
+        # How far each force may rise or fall in a step, and each joint may go.
+        margin = config.force_threshold_N - state.forces
+        rise = np.where(over, config.rise_over_N, np.minimum(margin, config.rise_below_N))
+        fall = np.where(over, config.fall_over_N, config.fall_below_N)
+        down, up = self._q_min - state.q, self._q_max - state.q
+        if config.forgive_joint_limits:
+            down, up = np.minimum(down, 0.0), np.maximum(up, 0.0)
+        x_min, x_max = self._equilibrium_bounds(state)
+        return QuadraticProgram(
+            P=2.0 * P,
+            c=2.0 * c,
+            A=np.vstack([model.force, model.joint]),
+            row_min=np.concatenate([-fall, down]),
+            row_max=np.concatenate([rise, up]),
+            x_min=x_min,
+            x_max=x_max,
+        )
+
+    def _equilibrium_bounds(self, state: MpcInput) -> tuple[Vector, Vector]:
+        """Returns the bounds of dphi itself: rate, wind-up and joint limits."""
+        rate = np.deg2rad(self.config.max_change_deg)
+        windup = np.deg2rad(self.config.max_windup_deg)
+        low = np.maximum(-rate, state.q - windup - state.q_d)
+        high = np.minimum(rate, state.q + windup - state.q_d)
+        if self.config.equilibrium_in_limits:
+            low = np.maximum(low, np.minimum(self._q_min - state.q_d, 0.0))
+            high = np.minimum(high, np.maximum(self._q_max - state.q_d, 0.0))
+        return low, high

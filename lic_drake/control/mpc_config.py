@@ -1,0 +1,93 @@
+"""Parameters of the quasi-static MPC, with the two published sets of values."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lic_drake.errors import ScenarioError
+
+
+@dataclass(kw_only=True)
+class MpcConfig:
+    """Parameters of `lic_drake.control.mpc`; SI units, angles in degrees where named so.
+
+    Source: gt-ros-pkg/hrl-haptic-manip (facts only). Infinite values switch a limit off.
+    """
+
+    # Control rate, Hz.
+    rate_hz: float = 25.0
+    # Contact forces up to this one are "don't care", N (paper V-A: 5 N in 2-D, 3 N in 3-D).
+    force_threshold_N: float = 5.0
+    # Taxel forces up to this one are ignored, N.
+    force_trim_N: float = 1.0
+    # Assumed stiffness of every contact, N/m.
+    contact_stiffness_N_per_m: float = 1000.0
+    # Wanted tip motion a step, m; shrinks in proportion once the goal is nearer than
+    # `slow_distance_m` (0: take the remaining error when it is smaller than the step).
+    tip_step_m: float = 0.02
+    slow_distance_m: float = 0.1
+    # Weights: tip position; squared joint torque change ("jerk"); force over the threshold.
+    position_weight: float = 1.0
+    torque_change_weight: float = 1e-4
+    force_weight: float = 0.005
+    # Divide the force term by the number of contacts over the threshold.
+    force_weight_shared: bool = True
+    # Wanted decrease of a force over the threshold, N a step.
+    force_decrease_N: float = 0.1
+    # Limits of the predicted force change a step, N, below and over the threshold.
+    rise_below_N: float = 0.1
+    fall_below_N: float = np.inf
+    rise_over_N: float = 0.0
+    fall_over_N: float = 10.0
+    # Limits of the equilibrium angles: change a step, distance from the joint angles
+    # ("wind-up"), distance at which they are pulled back, degrees.
+    max_change_deg: float = 0.5
+    max_windup_deg: float = 30.0
+    reset_windup_deg: float = 45.0
+    # Keep the equilibrium angles inside the joint limits, too.
+    equilibrium_in_limits: bool = True
+    # A joint beyond its limit only must not go further (else: must come back in one step).
+    forgive_joint_limits: bool = True
+
+    def __post_init__(self) -> None:
+        for name in ("rate_hz", "force_threshold_N", "contact_stiffness_N_per_m", "tip_step_m"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise ScenarioError(f"mpc {name} must be a positive number, got {value}")
+
+    @property
+    def period_s(self) -> float:
+        """Time between two control steps, seconds."""
+        return 1.0 / self.rate_hz
+
+
+def haptic_mpc_2013() -> MpcConfig:
+    """Returns the later controller: 25 Hz, up to 0.5 m/s (hrl_haptic_mpc, simulated 3 links)."""
+    return MpcConfig()
+
+
+def ijrr_2013() -> MpcConfig:
+    """Returns the controller of the paper's reference [1]: 100 Hz, 0.05 m/s."""
+    return MpcConfig(
+        rate_hz=100.0,
+        force_trim_N=0.5,
+        tip_step_m=0.0005,
+        slow_distance_m=0.0,
+        torque_change_weight=1e-5,
+        force_weight=1.0,
+        force_weight_shared=False,
+        force_decrease_N=0.2,
+        rise_below_N=0.1,
+        fall_below_N=0.1,
+        rise_over_N=-0.01,
+        fall_over_N=10.0,
+        max_change_deg=np.inf,
+        max_windup_deg=np.inf,
+        reset_windup_deg=np.inf,
+        equilibrium_in_limits=False,
+        forgive_joint_limits=False,
+    )
+
+
+PRESETS = {"haptic_mpc_2013": haptic_mpc_2013, "ijrr_2013": ijrr_2013}
+"""The published parameter sets by name."""

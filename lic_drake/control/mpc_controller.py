@@ -1,0 +1,64 @@
+"""`HapticMpcController`: the model predictive controller as a Drake system."""
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.systems.framework import Context, DiscreteStateIndex, DiscreteValues, LeafSystem
+
+from lic_drake.control.mpc import HapticMpc, MpcInput
+from lic_drake.control.mpc_config import MpcConfig
+from lic_drake.control.taxels import TaxelLayout
+from lic_drake.robots.arm import Arm
+
+
+class HapticMpcController(LeafSystem):
+    """Moves the arm's equilibrium angles so that the tip nears the goal with low forces.
+
+    Input ports:
+        arm_state: [q, v] of the arm, size 2 m, rad and rad/s.
+        taxel_force: Normal force on each taxel, size num_taxels, N, compression positive.
+        goal: p_RG, size 3, metres.
+    Output port:
+        desired_state: [q_d, 0], size 2 m, rad and rad/s, held between control steps.
+    """
+
+    def __init__(self, arm: Arm, layout: TaxelLayout, config: MpcConfig) -> None:
+        super().__init__()
+        self._arm = arm
+        self._layout = layout
+        self._mpc = HapticMpc(config, arm.stiffness, arm.q_min, arm.q_max)
+        self._num_joints = len(arm.q_min)
+        self._arm_state = self.DeclareVectorInputPort("arm_state", 2 * self._num_joints)
+        self._taxel_force = self.DeclareVectorInputPort("taxel_force", layout.num_taxels)
+        self._goal = self.DeclareVectorInputPort("goal", 3)
+        self._desired: DiscreteStateIndex = self.DeclareDiscreteState(2 * self._num_joints)
+        self.DeclareStateOutputPort("desired_state", self._desired)
+        self.DeclarePeriodicDiscreteUpdateEvent(config.period_s, 0.0, self._update)
+
+    def set_equilibrium(self, context: Context, q_d: NDArray[np.float64]) -> None:
+        """Sets the equilibrium angles, shape (m,), radians, in a context of this system."""
+        context.SetDiscreteState(self._desired, np.append(q_d, np.zeros(self._num_joints)))
+
+    def _update(self, context: Context, discrete_state: DiscreteValues) -> None:
+        q = np.asarray(self._arm_state.Eval(context))[: self._num_joints]
+        taxel_force = np.asarray(self._taxel_force.Eval(context))
+        p_RG = np.asarray(self._goal.Eval(context))
+        held = context.get_discrete_state(self._desired).value()[: self._num_joints]
+        q_d = self._mpc.pull_back(q, held)
+
+        loaded = np.flatnonzero(taxel_force > self._mpc.config.force_trim_N)
+        links = self._layout.link[loaded]
+        R_RL, p_RL = self._arm.link_poses(q)
+        turn = R_RL[links]
+        p_RC = p_RL[links] + np.einsum("ijk,ik->ij", turn, self._layout.p_LT[loaded])
+        state = MpcInput(
+            q=q,
+            q_d=q_d,
+            p_EG=p_RG - self._arm.tip_position(q),
+            Jv_E=self._arm.tip_jacobian(q),
+            normals=np.einsum("ijk,ik->ij", turn, self._layout.n_L[loaded]),
+            forces=taxel_force[loaded],
+            Jv_C=self._arm.point_jacobians(q, links, p_RC),
+        )
+        discrete_state.set_value(
+            self._desired, np.append(q_d + self._mpc.step(state), np.zeros(self._num_joints))
+        )

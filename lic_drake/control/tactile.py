@@ -1,0 +1,78 @@
+"""From contact patches to one normal force a taxel. No Drake here."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lic_drake.control.taxels import TaxelLayout
+
+MAX_ANGLE_COS = np.cos(np.deg2rad(45.0))
+"""A taxel takes a force only from within 45 degrees of its normal (authors' simulator)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactPatch:
+    """One contact of a link with one object.
+
+    Attributes:
+        link: Index of the link.
+        p_RQ: Centres of the patch's faces (one for a point contact), shape (k, 3), metres.
+        f_R: Normal forces of the link on the object at the faces, shape (k, 3), N.
+    """
+
+    link: int
+    p_RQ: NDArray[np.float64]
+    f_R: NDArray[np.float64]
+
+
+def calc_taxel_forces(
+    layout: TaxelLayout,
+    R_RL: NDArray[np.float64],
+    p_RL: NDArray[np.float64],
+    patches: list[ContactPatch],
+) -> NDArray[np.float64]:
+    """Returns the normal force on each taxel, shape (num_taxels,), N, compression positive.
+
+    A patch narrower than the taxels' pitch loads the single taxel at its centre of pressure, as
+    one contact does in the authors' simulator; a wider one loads the taxels under its faces.
+    The forces of all taxels add up to the normal forces of all faces.
+
+    Args:
+        layout: The taxels.
+        R_RL: Rotations of the links, shape (k, 3, 3).
+        p_RL: Positions of the links, shape (k, 3), metres.
+        patches: The contacts.
+    """
+    forces = np.zeros(layout.num_taxels)
+    for patch in patches:
+        magnitudes = np.linalg.norm(patch.f_R, axis=1)
+        total = magnitudes.sum()
+        if total <= 0.0:
+            continue
+        mine = np.flatnonzero(layout.link == patch.link)
+        R, p = R_RL[patch.link], p_RL[patch.link]
+        p_RT = p + layout.p_LT[mine] @ R.T
+        n_R = layout.n_L[mine] @ R.T
+        p_RC = magnitudes @ patch.p_RQ / total
+        extent = np.max(np.linalg.norm(patch.p_RQ - p_RC, axis=1))
+        if 2.0 * extent <= layout.pitch_m:
+            forces[mine[_nearest(p_RT, n_R, p_RC, patch.f_R.sum(axis=0))]] += total
+        else:
+            for p_RQ, f_R, magnitude in zip(patch.p_RQ, patch.f_R, magnitudes, strict=True):
+                forces[mine[_nearest(p_RT, n_R, p_RQ, f_R)]] += magnitude
+    return forces
+
+
+def _nearest(
+    p_RT: NDArray[np.float64],
+    n_R: NDArray[np.float64],
+    p_RQ: NDArray[np.float64],
+    f_R: NDArray[np.float64],
+) -> int:
+    """Returns the taxel nearest to Q among those that face the force."""
+    distance = np.sum((p_RT - p_RQ) ** 2, axis=1)
+    facing = n_R @ f_R >= MAX_ANGLE_COS * np.linalg.norm(f_R)
+    if np.any(facing):
+        distance = np.where(facing, distance, np.inf)
+    return int(np.argmin(distance))

@@ -1,0 +1,105 @@
+"""`TactileSensor`: the tactile skin as a Drake system."""
+
+from collections.abc import Callable
+from typing import cast
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.geometry import GeometryId
+from pydrake.multibody.plant import ContactResults, HydroelasticContactInfo, PointPairContactInfo
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
+
+from lic_drake.control.tactile import ContactPatch, calc_taxel_forces
+from lic_drake.control.taxels import TaxelLayout
+from lic_drake.robots.arm import Arm
+
+
+class TactileSensor(LeafSystem):
+    """Reads contact results and reports the force normal to the surface on each taxel.
+
+    Hydroelastic patches are read face by face (pressure times area); point contacts, to which
+    Drake falls back silently where two rigid bodies meet, count as patches of one face.
+
+    Input ports:
+        contact_results: Contact results of the plant (abstract).
+        arm_state: [q, v] of the arm, size 2 m, rad and rad/s.
+    Output port:
+        taxel_force: Normal force on each taxel, size num_taxels, N, compression positive.
+    """
+
+    def __init__(self, arm: Arm, layout: TaxelLayout, skin_links: dict[GeometryId, int]) -> None:
+        super().__init__()
+        self._arm = arm
+        self._layout = layout
+        self._skin_links = skin_links
+        self._contact_results = self.DeclareAbstractInputPort(
+            "contact_results", Value(ContactResults())
+        )
+        self._arm_state = self.DeclareVectorInputPort("arm_state", 2 * len(arm.q_min))
+        self.DeclareVectorOutputPort("taxel_force", layout.num_taxels, self._calc_taxel_force)
+
+    def _calc_taxel_force(self, context: Context, output: BasicVector) -> None:
+        results = cast(ContactResults, self._contact_results.Eval(context))
+        patches = read_patches(results, self._skin_links.get)
+        if not patches:
+            output.SetFromVector(np.zeros(self._layout.num_taxels))
+            return
+        q = np.asarray(self._arm_state.Eval(context))[: len(self._arm.q_min)]
+        output.SetFromVector(
+            calc_taxel_forces(self._layout, *self._arm.link_poses(q), patches)
+        )
+
+
+def read_patches(
+    results: ContactResults, link_of: Callable[[GeometryId], int | None]
+) -> list[ContactPatch]:
+    """Returns the contacts between the arm's skin and other bodies.
+
+    Args:
+        results: Contact results of the plant.
+        link_of: Gives the link index of a skin geometry, None for any other geometry.
+    """
+    patches = [
+        _read_surface(results.hydroelastic_contact_info(i), link_of)
+        for i in range(results.num_hydroelastic_contacts())
+    ]
+    patches += [
+        _read_point(results.point_pair_contact_info(i), link_of)
+        for i in range(results.num_point_pair_contacts())
+    ]
+    return [patch for patch in patches if patch is not None]
+
+
+def _read_surface(
+    info: HydroelasticContactInfo, link_of: Callable[[GeometryId], int | None]
+) -> ContactPatch | None:
+    """Reads a hydroelastic patch; its face normals point out of N, into M."""
+    surface = info.contact_surface()
+    link, sign = link_of(surface.id_N()), 1.0
+    if link is None:
+        link, sign = link_of(surface.id_M()), -1.0
+    if link is None:
+        return None
+    pressure = surface.poly_e_MN()
+    faces = range(surface.num_faces())
+    p_WQ = np.array([surface.centroid(i) for i in faces])
+    magnitude = [pressure.EvaluateCartesian(i, p_WQ[i]) * surface.area(i) for i in faces]
+    normal = np.array([surface.face_normal(i) for i in faces])
+    return ContactPatch(link=link, p_RQ=p_WQ, f_R=sign * np.array(magnitude)[:, None] * normal)
+
+
+def _read_point(
+    info: PointPairContactInfo, link_of: Callable[[GeometryId], int | None]
+) -> ContactPatch | None:
+    """Reads a point contact; Drake reports the force on body B."""
+    pair = info.point_pair()
+    link, sign = link_of(pair.id_A), 1.0
+    if link is None:
+        link, sign = link_of(pair.id_B), -1.0
+    if link is None:
+        return None
+    normal = -np.asarray(pair.nhat_BA_W)
+    f_Bc_W = max(0.0, float(normal @ info.contact_force())) * normal
+    return ContactPatch(
+        link=link, p_RQ=np.asarray(info.contact_point())[None], f_R=sign * f_Bc_W[None]
+    )

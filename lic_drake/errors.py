@@ -1,0 +1,20 @@
+"""The exceptions that a user may cause; the command line prints them as one line."""
+
+
+class LicError(Exception):
+    """Base class: something the user gave or asked for cannot be used as it is.
+
+    The message names the value, the limit, and what to do.
+    """
+
+
+class ScenarioError(LicError):
+    """A scenario file or one of its values is unusable."""
+
+
+class RequestError(LicError):
+    """A reach was asked for that cannot be made (goal out of reach, bad start pose, NaN)."""
+
+
+class LibraryError(LicError):
+    """An experience library cannot be read or written."""

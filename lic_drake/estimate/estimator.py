@@ -1,0 +1,58 @@
+"""What every success estimator offers."""
+
+from dataclasses import dataclass
+from typing import Protocol, Self
+
+from lic_drake.estimate.checks import Vector
+
+
+@dataclass(frozen=True, kw_only=True)
+class Prediction:
+    """Estimates for n queries.
+
+    Attributes:
+        probability: Estimated probability of success, shape (n,), within [0, 1].
+        spread: Standard deviation of that estimate, shape (n,); each estimator says of what.
+    """
+
+    probability: Vector
+    spread: Vector
+
+
+class Predictor(Protocol):
+    """An estimate of P(success) that can be fitted and asked, as cross-validation needs it."""
+
+    def fit(self, Z: Vector, f: Vector) -> Self:
+        """Learns from rows and returns itself.
+
+        Args:
+            Z: Features, shape (n, d), see `lic_drake.estimate.features`.
+            f: Successes, shape (n,), each 0 or 1.
+
+        Raises:
+            EstimateError: The rows are unusable.
+        """
+        ...
+
+    def predict(self, Z: Vector) -> Prediction:
+        """Estimates P(success) for queries Z, shape (n, d).
+
+        Raises:
+            EstimateError: Not fitted yet, or queries that do not fit.
+        """
+        ...
+
+
+class SuccessEstimator(Predictor, Protocol):
+    """F(s, x0) of paper III-D with its gradient, for the optimisation of Eq. (4)."""
+
+    def value_and_gradient(self, z: Vector) -> tuple[float, Vector]:
+        """Returns the estimate at z, shape (d,), and its gradient by z, shape (d,).
+
+        The value is not clipped into [0, 1]: a clipped one is flat where an optimiser needs
+        to climb, and would tie the best starts with each other.
+
+        Raises:
+            EstimateError: Not fitted yet, or a query that does not fit.
+        """
+        ...

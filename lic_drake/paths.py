@@ -1,0 +1,24 @@
+"""Finds the models folder, in a checkout or in an installed wheel."""
+
+from functools import cache
+from pathlib import Path
+
+
+@cache
+def models_dir() -> Path:
+    """Returns the folder with robot descriptions, scenarios and shipped libraries."""
+    package = Path(__file__).resolve().parent
+    for candidate in (package / "models", package.parent / "models"):
+        if (candidate / "package.xml").is_file():
+            return candidate
+    raise FileNotFoundError(f"no models folder beside {package}; reinstall lic_drake")
+
+
+def scenarios_dir() -> Path:
+    """Returns the folder with the scenario YAML files."""
+    return models_dir() / "scenarios"
+
+
+def experience_dir() -> Path:
+    """Returns the folder with the shipped experience libraries."""
+    return models_dir() / "experience"

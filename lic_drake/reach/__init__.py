@@ -1,0 +1,1 @@
+"""A reach as a function: `ReachRequest` in, `ReachRecord` out."""

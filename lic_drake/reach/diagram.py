@@ -1,0 +1,121 @@
+"""The reach diagram: arm and clutter wired to the tactile sensor and the MPC."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import Meshcat, MeshcatVisualizer, MeshcatVisualizerParams, Role
+from pydrake.multibody.meshcat import ContactVisualizer, ContactVisualizerParams
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource
+
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.control.mpc_controller import HapticMpcController
+from lic_drake.control.tactile_sensor import TactileSensor
+from lic_drake.control.taxels import planar_taxels
+from lic_drake.reach.scenario import Scenario
+from lic_drake.scene.scene import Scene, add_scene
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReachDiagram:
+    """A built diagram and what a rollout needs of it.
+
+    The diagram's input port is `goal` (p_WG, 3); its output ports are `arm_state` ([q, v]),
+    `clutter_state` ([p, v] of the movable objects), `taxel_force` and `desired_state`.
+    """
+
+    diagram: Diagram
+    scene: Scene
+    controller: HapticMpcController
+    visualizer: MeshcatVisualizer | None
+
+    def make_context(self, q: NDArray[np.float64], p_WG: NDArray[np.float64]) -> Context:
+        """Returns a context in which the arm rests at q and the goal is p_WG."""
+        context = self.diagram.CreateDefaultContext()
+        plant = self.scene.plant
+        plant.SetPositions(plant.GetMyMutableContextFromRoot(context), self.scene.arm, q)
+        self.controller.set_equilibrium(
+            self.controller.GetMyMutableContextFromRoot(context), q
+        )
+        self.diagram.GetInputPort("goal").FixValue(context, p_WG)
+        return context
+
+
+def make_reach_diagram(
+    scenario: Scenario,
+    instance: ClutterInstance,
+    meshcat: Meshcat | None = None,
+    frames_per_second: float = 30.0,
+) -> ReachDiagram:
+    """Builds the diagram of one environment.
+
+    Args:
+        scenario: Robot, contact, controller.
+        instance: The clutter.
+        meshcat: Where to draw the scene and its contact forces, if anywhere.
+        frames_per_second: How often to draw, 1/s.
+    """
+    builder = DiagramBuilder()
+    arm = scenario.arm()
+    layout = planar_taxels(arm.skin)
+    scene = add_scene(builder, arm, instance, scenario.scene)
+    plant = scene.plant
+    plant.set_name("plant")
+
+    sensor = builder.AddNamedSystem("sensor", TactileSensor(arm, layout, scene.skin_links))
+    builder.Connect(
+        plant.get_contact_results_output_port(), sensor.GetInputPort("contact_results")
+    )
+    builder.Connect(plant.get_state_output_port(scene.arm), sensor.GetInputPort("arm_state"))
+
+    controller = builder.AddNamedSystem(
+        "controller", HapticMpcController(arm, layout, scenario.mpc)
+    )
+    builder.Connect(plant.get_state_output_port(scene.arm), controller.GetInputPort("arm_state"))
+    builder.Connect(sensor.GetOutputPort("taxel_force"), controller.GetInputPort("taxel_force"))
+    builder.Connect(
+        controller.GetOutputPort("desired_state"), plant.get_desired_state_input_port(scene.arm)
+    )
+    builder.ExportInput(controller.GetInputPort("goal"), "goal")
+
+    # The movables' actuators are their dry friction: they always want to stand still.
+    standstill = builder.AddNamedSystem(
+        "standstill",
+        ConstantVectorSource(np.zeros(plant.num_multibody_states(scene.clutter))),
+    )
+    builder.Connect(
+        standstill.get_output_port(), plant.get_desired_state_input_port(scene.clutter)
+    )
+
+    builder.ExportOutput(plant.get_state_output_port(scene.arm), "arm_state")
+    builder.ExportOutput(plant.get_state_output_port(scene.clutter), "clutter_state")
+    builder.ExportOutput(sensor.GetOutputPort("taxel_force"), "taxel_force")
+    builder.ExportOutput(controller.GetOutputPort("desired_state"), "desired_state")
+
+    visualizer = None
+    if meshcat is not None:
+        visualizer = MeshcatVisualizer.AddToBuilder(
+            builder,
+            scene.scene_graph,
+            meshcat,
+            MeshcatVisualizerParams(
+                role=Role.kIllustration, publish_period=1.0 / frames_per_second
+            ),
+        )
+        ContactVisualizer.AddToBuilder(
+            builder,
+            plant,
+            meshcat,
+            ContactVisualizerParams(
+                publish_period=1.0 / frames_per_second,
+                newtons_per_meter=50.0,
+                force_threshold=0.05,
+                radius=0.003,
+            ),
+        )
+    diagram = builder.Build()
+    diagram.set_name("reach")
+    return ReachDiagram(
+        diagram=diagram, scene=scene, controller=controller, visualizer=visualizer
+    )

@@ -1,0 +1,96 @@
+"""`ReachRequest` and `ReachRecord`: what goes into a reach and what comes out, as plain data."""
+
+import hashlib
+import json
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lic_drake.reach.scenario import Scenario
+
+OUTCOMES = ("reached", "stuck", "force", "timeout", "diverged", "invalid_start")
+"""How a reach can end: at the goal; without progress; by the force stop; out of time; by a
+failure of the simulator; before it began, because the arm cannot stand at the start."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReachRequest:
+    """One reach to simulate. The record is a pure function of it.
+
+    Attributes:
+        scenario: Category, robot, contact, controller and stop rules.
+        stream: Seed stream of the environment, one of `lic_drake.seeds.STREAMS`.
+        environment: Index of the environment in its stream.
+        goal: p_WG, (x, y, z), metres.
+        start: Hand pose x0; in the plane (x, y, phi), metres and radians.
+    """
+
+    scenario: Scenario
+    stream: str
+    environment: int
+    goal: tuple[float, float, float]
+    start: tuple[float, float, float]
+
+    @property
+    def key(self) -> str:
+        """Identifies the request in a library: 16 hexadecimal digits."""
+        content = [self.scenario.digest, self.stream, self.environment, self.goal, self.start]
+        return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReachRecord:
+    """One row of an experience library. SI units, radians, world frame W.
+
+    Every field but `wall_time_s` is a function of the request; that one is left out when
+    records are compared. Where a reach never began (`invalid_start`), measured fields are NaN.
+    """
+
+    key: str = field(metadata={"unit": "", "doc": "key of the request"})
+    category: str = field(metadata={"unit": "", "doc": "clutter category"})
+    robot: str = field(metadata={"unit": "", "doc": "robot"})
+    scenario: str = field(metadata={"unit": "", "doc": "digest of the scenario"})
+    stream: str = field(metadata={"unit": "", "doc": "seed stream of the environment"})
+    environment: int = field(metadata={"unit": "", "doc": "index in the stream"})
+    goal_x: float = field(metadata={"unit": "m", "doc": "goal p_WG"})
+    goal_y: float = field(metadata={"unit": "m", "doc": "goal p_WG"})
+    goal_z: float = field(metadata={"unit": "m", "doc": "goal p_WG"})
+    start_x: float = field(metadata={"unit": "m", "doc": "start pose x0"})
+    start_y: float = field(metadata={"unit": "m", "doc": "start pose x0"})
+    start_phi: float = field(metadata={"unit": "rad", "doc": "start pose x0"})
+    outcome: str = field(metadata={"unit": "", "doc": "one of OUTCOMES"})
+    success: bool = field(metadata={"unit": "", "doc": "outcome is reached"})
+    final_x: float = field(metadata={"unit": "m", "doc": "final hand pose x_inf"})
+    final_y: float = field(metadata={"unit": "m", "doc": "final hand pose x_inf"})
+    final_phi: float = field(metadata={"unit": "rad", "doc": "final hand pose x_inf"})
+    final_vx: float = field(
+        metadata={"unit": "m/s", "doc": "mean tip velocity of the last second of motion"}
+    )
+    final_vy: float = field(
+        metadata={"unit": "m/s", "doc": "mean tip velocity of the last second of motion"}
+    )
+    min_distance: float = field(metadata={"unit": "m", "doc": "smallest distance tip to goal"})
+    peak_force: float = field(metadata={"unit": "N", "doc": "largest taxel force"})
+    mean_force: float = field(
+        metadata={"unit": "N", "doc": "mean force of the loaded taxels over the reach"}
+    )
+    peak_contacts: int = field(metadata={"unit": "", "doc": "largest number of loaded taxels"})
+    mean_contacts: float = field(metadata={"unit": "", "doc": "mean number of loaded taxels"})
+    duration_s: float = field(metadata={"unit": "s", "doc": "simulated time"})
+    wall_time_s: float = field(compare=False, metadata={"unit": "s", "doc": "wall time"})
+    q_start: tuple[float, ...] = field(metadata={"unit": "rad", "doc": "first joint angles"})
+    q_final: tuple[float, ...] = field(metadata={"unit": "rad", "doc": "last joint angles"})
+    detail: str = field(metadata={"unit": "", "doc": "why a reach diverged or never began"})
+    lic_drake_version: str = field(metadata={"unit": "", "doc": "version of lic_drake"})
+    drake_version: str = field(metadata={"unit": "", "doc": "version of Drake"})
+
+    @property
+    def p_WG(self) -> NDArray[np.float64]:
+        """The goal, shape (3,), metres."""
+        return np.array([self.goal_x, self.goal_y, self.goal_z])
+
+    @property
+    def x0(self) -> NDArray[np.float64]:
+        """The start pose (x, y, phi), metres and radians."""
+        return np.array([self.start_x, self.start_y, self.start_phi])

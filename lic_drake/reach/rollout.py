@@ -1,0 +1,199 @@
+"""`run_reach`: simulates one request and returns its record."""
+
+import math
+import time
+from dataclasses import replace
+from functools import cache
+from importlib.metadata import version
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import QueryObject
+from pydrake.systems.analysis import Simulator
+
+import lic_drake
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.reach.diagram import ReachDiagram, make_reach_diagram
+from lic_drake.reach.request import ReachRecord, ReachRequest
+from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.stop_rules import StopMonitor
+from lic_drake.reach.trace import ReachTrace
+from lic_drake.scene.culling import reaches_left_out, select_near, take
+
+Vector = NDArray[np.float64]
+
+
+class Environment:
+    """One environment of a scenario with its diagram, used for many reaches."""
+
+    def __init__(self, scenario: Scenario, instance: ClutterInstance) -> None:
+        self.scenario = scenario
+        self.instance = instance
+        self.arm = scenario.arm()
+        self.keep = select_near(instance, self.arm.reach_m)
+        self._near = make_reach_diagram(scenario, take(instance, self.keep))
+        self._whole: ReachDiagram | None = None
+
+    def reach(self, p_WG: Vector, x0: Vector) -> tuple[str, ReachTrace, str]:
+        """Simulates a reach.
+
+        Args:
+            p_WG: Goal, shape (3,), metres.
+            x0: Start pose of the hand.
+
+        Returns:
+            The outcome, the trace, and a remark for outcomes that need one. The trace is empty
+            when the arm cannot stand at the start.
+        """
+        outcome, trace, detail = self._run(self._near, p_WG, x0)
+        if trace.q and reaches_left_out(self.instance, self.keep, trace.outermost_m):
+            if self._whole is None:
+                self._whole = make_reach_diagram(self.scenario, self.instance)
+            outcome, trace, detail = self._run(self._whole, p_WG, x0)
+        return outcome, trace, detail
+
+    def _run(
+        self, reach_diagram: ReachDiagram, p_WG: Vector, x0: Vector
+    ) -> tuple[str, ReachTrace, str]:
+        q0 = self.arm.solve_ik(x0)
+        if q0 is None:
+            return "invalid_start", ReachTrace(), "no configuration within the joint limits"
+        return simulate(reach_diagram, self.scenario, q0, p_WG)
+
+
+def simulate(
+    reach_diagram: ReachDiagram, scenario: Scenario, q0: Vector, p_WG: Vector
+) -> tuple[str, ReachTrace, str]:
+    """Runs a diagram from rest at q0 until a stop rule ends the reach.
+
+    Args:
+        reach_diagram: The environment's diagram.
+        scenario: Gives the control period and the stop rules.
+        q0: First joint angles, shape (m,), radians.
+        p_WG: Goal, shape (3,), metres.
+
+    Returns:
+        Outcome, trace and remark as `Environment.reach`.
+    """
+    diagram, scene = reach_diagram.diagram, reach_diagram.scene
+    arm = scenario.arm()
+    context = reach_diagram.make_context(q0, p_WG)
+    query = cast(
+        QueryObject,
+        scene.scene_graph.get_query_output_port().Eval(
+            scene.scene_graph.GetMyContextFromRoot(context)
+        ),
+    )
+    if query.HasCollisions():
+        return "invalid_start", ReachTrace(), "the arm touches the clutter at its start"
+
+    arm_state = diagram.GetOutputPort("arm_state")
+    clutter_state = diagram.GetOutputPort("clutter_state")
+    taxel_force = diagram.GetOutputPort("taxel_force")
+    num_movable = scene.plant.num_positions(scene.clutter) // 2
+    monitor = StopMonitor(scenario.stop, p_WG, scenario.mpc.period_s)
+    trace = ReachTrace()
+    simulator = Simulator(diagram, context)
+    step = 0
+    while True:
+        try:
+            if step == 0:
+                simulator.Initialize()
+            simulator.AdvanceTo(step * scenario.mpc.period_s)
+        except RuntimeError as error:
+            return "diverged", trace, " ".join(str(error).split())[:200]
+        q = np.array(arm_state.Eval(context)[: len(q0)])
+        if not np.all(np.isfinite(q)):
+            return "diverged", trace, "joint angles are not finite"
+        p_WE = arm.tip_position(q)
+        forces = np.asarray(taxel_force.Eval(context))
+        trace.append(context.get_time(), q, p_WE, forces)
+        if num_movable:
+            p_WO = np.asarray(clutter_state.Eval(context))[: 2 * num_movable].reshape(-1, 2)
+            farthest = float(np.sqrt(np.max(np.sum(p_WO**2, axis=1))))
+            trace.outermost_m = max(trace.outermost_m, farthest)
+        outcome = monitor.update(context.get_time(), p_WE, trace.peak_force[-1])
+        if outcome is not None:
+            return outcome, trace, ""
+        step += 1
+
+
+_recent: dict[tuple[str, str, int], Environment] = {}
+
+
+def environment_of(request: ReachRequest) -> Environment:
+    """Returns the environment of a request; the last one used in this process is kept."""
+    key = (request.scenario.digest, request.stream, request.environment)
+    if key not in _recent:
+        _recent.clear()
+        scenario = request.scenario
+        instance = scenario.sample_instance(request.stream, request.environment)
+        _recent[key] = Environment(scenario, instance)
+    return _recent[key]
+
+
+def run_reach(request: ReachRequest) -> ReachRecord:
+    """Simulates a request; its record depends on nothing else.
+
+    Physical failures are outcomes, not exceptions: see `lic_drake.reach.request.OUTCOMES`.
+    """
+    began = time.perf_counter()
+    p_WG, x0 = np.array(request.goal), np.array(request.start)
+    outcome, trace, detail = environment_of(request).reach(p_WG, x0)
+    return make_record(request, outcome, trace, detail, time.perf_counter() - began)
+
+
+def make_record(
+    request: ReachRequest, outcome: str, trace: ReachTrace, detail: str, wall_time_s: float
+) -> ReachRecord:
+    """Returns the library row of a finished reach."""
+    scenario = request.scenario
+    nothing = not trace.q
+    final = np.full(3, np.nan) if nothing else scenario.arm().tip_pose(trace.q[-1])
+    still_s = scenario.stop.stuck_time_s if outcome == "stuck" else 0.0
+    velocity = np.full(3, np.nan) if nothing else trace.final_velocity(still_s)
+    distances = np.linalg.norm(np.array(trace.p_WE).reshape(-1, 3) - request.goal, axis=1)
+    return ReachRecord(
+        key=request.key,
+        category=scenario.category,
+        robot=scenario.robot,
+        scenario=scenario.digest,
+        stream=request.stream,
+        environment=request.environment,
+        goal_x=request.goal[0],
+        goal_y=request.goal[1],
+        goal_z=request.goal[2],
+        start_x=request.start[0],
+        start_y=request.start[1],
+        start_phi=request.start[2],
+        outcome=outcome,
+        success=outcome == "reached",
+        final_x=float(final[0]),
+        final_y=float(final[1]),
+        final_phi=float(final[2]),
+        final_vx=float(velocity[0]),
+        final_vy=float(velocity[1]),
+        min_distance=math.nan if nothing else float(distances.min()),
+        peak_force=math.nan if nothing else max(trace.peak_force),
+        mean_force=math.nan if nothing else trace.mean_force,
+        peak_contacts=0 if nothing else max(trace.contacts),
+        mean_contacts=math.nan if nothing else float(np.mean(trace.contacts)),
+        duration_s=0.0 if nothing else trace.time_s[-1],
+        wall_time_s=wall_time_s,
+        q_start=() if nothing else tuple(trace.q[0].tolist()),
+        q_final=() if nothing else tuple(trace.q[-1].tolist()),
+        detail=detail,
+        lic_drake_version=lic_drake.__version__,
+        drake_version=_drake_version(),
+    )
+
+
+@cache
+def _drake_version() -> str:
+    return version("drake")
+
+
+def with_start(request: ReachRequest, x0: Vector) -> ReachRequest:
+    """Returns the same request from another start pose."""
+    return replace(request, start=(float(x0[0]), float(x0[1]), float(x0[2])))

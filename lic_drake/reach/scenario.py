@@ -1,0 +1,161 @@
+"""Scenarios: everything that a reach depends on but its environment, goal and start.
+
+A scenario is a YAML file; the shipped ones are in models/scenarios. Unknown keys are errors.
+"""
+
+import dataclasses
+import hashlib
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from pydrake.common.yaml import yaml_load_typed
+
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.clutter.registry import ClutterSampler, get_category
+from lic_drake.control.mpc_config import PRESETS, MpcConfig
+from lic_drake.errors import ScenarioError
+from lic_drake.paths import scenarios_dir
+from lic_drake.reach.stop_rules import StopConfig
+from lic_drake.reach.task import Task
+from lic_drake.robots.arm import Arm
+from lic_drake.robots.registry import get_robot
+from lic_drake.scene.scene import SceneConfig
+from lic_drake.seeds import make_generator
+
+
+@dataclass(kw_only=True)
+class Scenario:
+    """A category of clutter, a robot and how they are simulated; plain data that pickles."""
+
+    category: str
+    robot: str
+    clutter: ClutterSampler
+    task: Task = field(default_factory=Task)
+    scene: SceneConfig = field(default_factory=SceneConfig)
+    mpc: MpcConfig = field(default_factory=MpcConfig)
+    stop: StopConfig = field(default_factory=StopConfig)
+
+    @property
+    def digest(self) -> str:
+        """Identifies the scenario's values: 12 hexadecimal digits."""
+        values = json.dumps(to_dict(self), sort_keys=True, default=repr)
+        return hashlib.sha256(values.encode()).hexdigest()[:12]
+
+    def arm(self) -> Arm:
+        """Returns the robot."""
+        return get_robot(self.robot)
+
+    def sample_instance(self, stream: str, environment: int) -> ClutterInstance:
+        """Draws the environment with this index in a seed stream."""
+        return self.clutter.sample(make_generator(stream, self.category, environment))
+
+    def sample_goal(self, stream: str, environment: int, index: int = 0) -> np.ndarray:
+        """Draws the goal with this index for an environment, p_WG, shape (3,), metres."""
+        return self.task.goal_area.sample(make_generator(stream, "goal", environment, index))
+
+
+def to_dict(scenario: Scenario) -> dict[str, Any]:
+    """Returns the scenario's values as nested plain dictionaries."""
+    return dataclasses.asdict(scenario)
+
+
+def load_scenario(name_or_path: str | Path, overrides: str = "") -> Scenario:
+    """Reads a scenario.
+
+    Args:
+        name_or_path: Name of a shipped scenario ("cylinder-clutter") or a path to a YAML file.
+        overrides: YAML text merged over the file, for instance "{mpc: {preset: ijrr_2013}}".
+
+    Raises:
+        ScenarioError: No such scenario, or a key or value that does not fit.
+    """
+    path = Path(name_or_path)
+    if path.suffix not in (".yaml", ".yml"):
+        path = scenarios_dir() / f"{name_or_path}.yaml"
+    try:
+        content = path.read_text(encoding="utf-8")
+    except OSError:
+        known = ", ".join(sorted(p.stem for p in scenarios_dir().glob("*.yaml")))
+        raise ScenarioError(
+            f"no scenario {str(name_or_path)!r}; shipped scenarios: {known}, or give a .yaml path"
+        ) from None
+    return parse_scenario(content, overrides, source=str(name_or_path))
+
+
+def parse_scenario(content: str, overrides: str = "", source: str = "scenario") -> Scenario:
+    """Builds a scenario from YAML text; see `load_scenario`."""
+    data = _merge(_mapping(content, source), _mapping(overrides, "overrides"))
+    sections = {"category", "robot", "clutter", "task", "scene", "mpc", "stop"}
+    unknown = set(data) - sections
+    if unknown:
+        raise ScenarioError(
+            f"{source}: unknown key {sorted(map(str, unknown))[0]!r}; known: {sorted(sections)}"
+        )
+    if "category" not in data or "robot" not in data:
+        raise ScenarioError(f"{source}: needs the keys 'category' and 'robot'")
+    sampler = get_category(data["category"])
+    get_robot(data["robot"])
+    mpc = dict(data.get("mpc") or {})
+    preset = mpc.pop("preset", "haptic_mpc_2013")
+    if preset not in PRESETS:
+        raise ScenarioError(f"{source}: unknown mpc preset {preset!r}; choose {list(PRESETS)}")
+    return Scenario(
+        category=data["category"],
+        robot=data["robot"],
+        clutter=_typed(sampler, data.get("clutter"), f"{source}: clutter"),
+        task=_typed(Task, data.get("task"), f"{source}: task"),
+        scene=_typed(SceneConfig, data.get("scene"), f"{source}: scene"),
+        mpc=_typed(MpcConfig, mpc, f"{source}: mpc", defaults=PRESETS[preset]()),
+        stop=_typed(StopConfig, data.get("stop"), f"{source}: stop"),
+    )
+
+
+def _mapping(content: str, source: str) -> dict[str, Any]:
+    """Parses YAML text that must be a mapping."""
+    try:
+        data = yaml.safe_load(content) if content.strip() else {}
+    except yaml.YAMLError as error:
+        raise ScenarioError(f"{source}: not YAML: {' '.join(str(error).split())}") from None
+    if not isinstance(data, dict):
+        raise ScenarioError(f"{source}: must be a YAML mapping, found {type(data).__name__}")
+    return data
+
+
+def _merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
+    """Returns `base` with the values of `over` put over it, level by level."""
+    merged = dict(base)
+    for key, value in over.items():
+        old = merged.get(key)
+        both = isinstance(old, dict) and isinstance(value, dict)
+        merged[key] = _merge(old, value) if both else value
+    return merged
+
+
+def _typed(schema: type[Any], data: Any, source: str, defaults: Any = None) -> Any:
+    """Reads one section with Drake's typed YAML reader, which refuses unknown keys."""
+    try:
+        section = yaml_load_typed(
+            schema=schema,
+            data=yaml.safe_dump(data or {}),
+            defaults=schema() if defaults is None else defaults,
+        )
+        _check(section)
+        return section
+    except ScenarioError as error:
+        raise ScenarioError(f"{source}: {error}") from None
+    except (RuntimeError, ValueError, TypeError, AssertionError) as error:
+        raise ScenarioError(f"{source}: {' '.join(str(error).split())}") from None
+
+
+def _check(section: Any) -> None:
+    """Runs the checks of a dataclass and its parts again: the reader sets fields after them."""
+    for item in dataclasses.fields(section):
+        value = getattr(section, item.name)
+        if dataclasses.is_dataclass(value):
+            _check(value)
+    if hasattr(section, "__post_init__"):
+        section.__post_init__()

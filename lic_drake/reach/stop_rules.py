@@ -1,0 +1,65 @@
+"""When a reach ends: at the goal, stuck, by force, or out of time. Pure bookkeeping."""
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lic_drake.errors import ScenarioError
+
+
+@dataclass(kw_only=True)
+class StopConfig:
+    """Limits of a reach; the paper states none of them."""
+
+    # A reach succeeds when the tip is this near the goal, metres (authors' batch scripts).
+    success_distance_m: float = 0.015
+    # A reach is stuck when the tip moved less than `stuck_distance_m` in `stuck_time_s`.
+    stuck_distance_m: float = 0.002
+    stuck_time_s: float = 4.0
+    # Simulated seconds after which a reach fails.
+    timeout_s: float = 30.0
+    # A reach fails when a taxel reads more than this, N.
+    force_limit_N: float = 15.0
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not value > 0.0:
+                raise ScenarioError(f"stop rule {name} must be positive, got {value}")
+
+
+class StopMonitor:
+    """Follows a reach sample by sample and says when and how it ends."""
+
+    def __init__(self, config: StopConfig, p_WG: NDArray[np.float64], period_s: float) -> None:
+        self._config = config
+        self._p_WG = p_WG
+        # Tip positions from now back to `stuck_time_s` ago, at the control period.
+        self._recent: deque[NDArray[np.float64]] = deque(
+            maxlen=round(config.stuck_time_s / period_s) + 1
+        )
+        self.min_distance = np.inf
+
+    def update(self, time_s: float, p_WE: NDArray[np.float64], peak_force: float) -> str | None:
+        """Takes a sample; returns the outcome if the reach ends with it, else None.
+
+        Args:
+            time_s: Simulated time, seconds.
+            p_WE: Tip position, shape (3,), metres.
+            peak_force: Largest taxel force of the sample, N.
+        """
+        self._recent.append(p_WE)
+        distance = float(np.linalg.norm(p_WE - self._p_WG))
+        self.min_distance = min(self.min_distance, distance)
+        if distance < self._config.success_distance_m:
+            return "reached"
+        if peak_force > self._config.force_limit_N:
+            return "force"
+        if len(self._recent) == self._recent.maxlen:
+            moved = float(np.linalg.norm(self._recent[-1] - self._recent[0]))
+            if moved < self._config.stuck_distance_m:
+                return "stuck"
+        if time_s >= self._config.timeout_s - 1e-9:
+            return "timeout"
+        return None

@@ -1,0 +1,103 @@
+"""Where a reach may start and where its goals lie (paper IV-A)."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lic_drake.errors import ScenarioError
+from lic_drake.robots.arm import Arm
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(kw_only=True)
+class StartLine:
+    """Hand poses x0 = (x, y, phi) on a segment between robot and clutter, in R.
+
+    The grid is the paper's: positions 0.1 m and orientations 30 degrees apart, of which the
+    arm's joint limits leave 21.
+    """
+
+    # Distance of the segment from the base, metres. With the arm's joint limits only
+    # 0.325..0.342 m leaves the paper's 21 (and 14) initial conditions.
+    x_m: float = 0.335
+    # Ends of the segment and grid distance, metres (paper IV-A).
+    y_min_m: float = -0.4
+    y_max_m: float = 0.4
+    y_step_m: float = 0.1
+    # Range of orientations and grid distance, degrees (paper IV-A).
+    phi_min_deg: float = -90.0
+    phi_max_deg: float = 90.0
+    phi_step_deg: float = 30.0
+
+    def __post_init__(self) -> None:
+        _check_range("start line y_m", self.y_min_m, self.y_max_m, self.y_step_m)
+        _check_range("start line phi_deg", self.phi_min_deg, self.phi_max_deg, self.phi_step_deg)
+
+    @property
+    def lower(self) -> Vector:
+        """Lower bounds of x0, shape (3,), metres and radians."""
+        return np.array([self.x_m, self.y_min_m, np.deg2rad(self.phi_min_deg)])
+
+    @property
+    def upper(self) -> Vector:
+        """Upper bounds of x0, shape (3,), metres and radians."""
+        return np.array([self.x_m, self.y_max_m, np.deg2rad(self.phi_max_deg)])
+
+    def grid(self, arm: Arm) -> Vector:
+        """Returns the grid poses that the arm can take, shape (n, 3), metres and radians."""
+        y = _steps(self.y_min_m, self.y_max_m, self.y_step_m)
+        phi = np.deg2rad(_steps(self.phi_min_deg, self.phi_max_deg, self.phi_step_deg))
+        poses = [np.array([self.x_m, yi, phi_i]) for yi in y for phi_i in phi]
+        return np.array([x0 for x0 in poses if arm.solve_ik(x0) is not None])
+
+
+@dataclass(kw_only=True)
+class GoalArea:
+    """Rectangle of goals p_WG with its training grid (paper: 0.4 x 0.8 m, 5 x 9 at 0.1 m)."""
+
+    # Corners (x, y) in W and grid distance, metres.
+    lower: list[float] = field(default_factory=lambda: [0.4, -0.4])
+    upper: list[float] = field(default_factory=lambda: [0.8, 0.4])
+    step_m: float = 0.1
+
+    def __post_init__(self) -> None:
+        if len(self.lower) != 2 or len(self.upper) != 2:
+            raise ScenarioError(
+                f"goal area corners must be [x, y], got {self.lower}, {self.upper}"
+            )
+        for name, low, high in zip("xy", self.lower, self.upper, strict=True):
+            _check_range(f"goal area {name}", low, high, self.step_m)
+
+    def grid(self) -> Vector:
+        """Returns the grid goals, shape (n, 3), metres; x varies slowest."""
+        x = _steps(self.lower[0], self.upper[0], self.step_m)
+        y = _steps(self.lower[1], self.upper[1], self.step_m)
+        return np.array([[xi, yi, 0.0] for xi in x for yi in y])
+
+    def sample(self, rng: np.random.Generator) -> Vector:
+        """Draws a goal p_WG uniformly, shape (3,), metres."""
+        return np.append(rng.uniform(self.lower, self.upper), 0.0)
+
+
+@dataclass(kw_only=True)
+class Task:
+    """The start line and the goal area of a scenario."""
+
+    start_line: StartLine = field(default_factory=StartLine)
+    goal_area: GoalArea = field(default_factory=GoalArea)
+
+
+def _check_range(name: str, low: float, high: float, step: float) -> None:
+    if not np.all(np.isfinite([low, high, step])) or high < low or step <= 0.0:
+        raise ScenarioError(
+            f"{name}: needs finite numbers with min <= max and a positive step,"
+            f" got {low}..{high} step {step}"
+        )
+
+
+def _steps(low: float, high: float, step: float) -> Vector:
+    """Returns low, low + step, .. high, rounded so that grid values print as written."""
+    count = int(np.floor((high - low) / step + 1e-9)) + 1
+    return np.round(low + step * np.arange(count), 12)

@@ -1,0 +1,64 @@
+"""What happened during a reach, sample by sample, and the figures that a record keeps of it."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(kw_only=True)
+class ReachTrace:
+    """Samples at the control rate, from the start to the end of a reach.
+
+    Attributes:
+        time_s: Simulated times, seconds.
+        q: Joint angles, each shape (m,), radians.
+        p_WE: Tip positions, each shape (3,), metres.
+        peak_force: Largest taxel force of each sample, N.
+        total_force: Sum of the taxel forces, N.
+        contacts: Number of loaded taxels.
+        outermost_m: Largest distance from the base that a movable object's centre had, metres.
+    """
+
+    time_s: list[float] = field(default_factory=list)
+    q: list[Vector] = field(default_factory=list)
+    p_WE: list[Vector] = field(default_factory=list)
+    peak_force: list[float] = field(default_factory=list)
+    total_force: list[float] = field(default_factory=list)
+    contacts: list[int] = field(default_factory=list)
+    outermost_m: float = 0.0
+
+    def append(self, time_s: float, q: Vector, p_WE: Vector, taxel_force: Vector) -> None:
+        """Adds a sample; `taxel_force` has shape (num_taxels,), N."""
+        self.time_s.append(time_s)
+        self.q.append(q)
+        self.p_WE.append(p_WE)
+        self.peak_force.append(float(taxel_force.max()))
+        self.total_force.append(float(taxel_force.sum()))
+        self.contacts.append(int(np.count_nonzero(taxel_force)))
+
+    @property
+    def mean_force(self) -> float:
+        """Mean force of a loaded taxel over all samples, N; 0 without contact."""
+        loaded = sum(self.contacts)
+        return sum(self.total_force) / loaded if loaded else 0.0
+
+    def final_velocity(self, still_s: float, window_s: float = 1.0) -> Vector:
+        """Returns the mean tip velocity in the last second of motion, shape (3,), m/s.
+
+        Args:
+            still_s: Length of the time at the end in which the tip stood still, seconds: the
+                stuck rule's for a reach that got stuck, else 0. The paper's final velocity would
+                otherwise always be nearly zero there.
+            window_s: Length of the window, seconds.
+        """
+        times = np.array(self.time_s)
+        end = max(times[-1] - still_s, times[0])
+        last = int(np.searchsorted(times, end + 1e-9) - 1)
+        first = int(np.searchsorted(times, end - window_s - 1e-9))
+        span = times[last] - times[first]
+        if span <= 0.0:
+            return np.zeros(3)
+        return (self.p_WE[last] - self.p_WE[first]) / span

@@ -1,0 +1,1 @@
+"""Robots: kinematics, limits, and how each is added to a plant."""

@@ -1,0 +1,179 @@
+"""Plant and scene graph from an arm, a clutter instance and a contact configuration."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import (
+    Box,
+    Cylinder,
+    GeometryId,
+    RoleAssign,
+    SceneGraph,
+    Shape,
+    Sphere,
+)
+from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
+from pydrake.multibody.tree import (
+    ModelInstanceIndex,
+    PdControllerGains,
+    PrismaticJoint,
+    RigidBody,
+    SpatialInertia,
+    UnitInertia,
+)
+from pydrake.systems.framework import DiagramBuilder
+
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.robots.arm import Arm
+from lic_drake.scene.contact import ContactConfig, object_properties, skin_properties
+
+FIXED_COLOR = np.array([0.55, 0.25, 0.20, 1.0])
+MOVABLE_COLOR = np.array([0.95, 0.70, 0.35, 1.0])
+
+
+@dataclass(kw_only=True)
+class SceneConfig:
+    """How the world is simulated."""
+
+    # Step of the discrete plant, seconds; 0 makes it continuous (for the CENIC integrator).
+    time_step_s: float = 0.0025
+    # Drake's discrete contact approximation.
+    contact_approximation: str = "lagged"
+    # Dry friction of a movable object on the ground, N (authors' simulator), and the speed up to
+    # which it grows, m/s.
+    ground_friction_N: float = 2.0
+    ground_creep_m_per_s: float = 1e-3
+    contact: ContactConfig = field(default_factory=ContactConfig)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """What the sensor, the controller and the rollout need to know of the plant.
+
+    Attributes:
+        plant: The finalized plant.
+        scene_graph: Its scene graph.
+        arm: Model instance of the arm.
+        clutter: Model instance of the movable objects.
+        skin_links: Skin geometry -> index into the arm's link names.
+    """
+
+    plant: MultibodyPlant
+    scene_graph: SceneGraph
+    arm: ModelInstanceIndex
+    clutter: ModelInstanceIndex
+    skin_links: dict[GeometryId, int]
+
+
+def add_scene(
+    builder: DiagramBuilder, arm: Arm, instance: ClutterInstance, config: SceneConfig
+) -> Scene:
+    """Adds a plant with the arm and the clutter, and its scene graph, to a builder.
+
+    Movable objects translate in the ground plane on two prismatic joints: the friction torque of
+    the authors' objects is larger than any contact torque, so they never spin. Their dry ground
+    friction is an actuator without stiffness: a strong damper whose force saturates, which Drake
+    integrates implicitly. The actuators' desired-state port must get zeros.
+    """
+    plant, scene_graph = AddMultibodyPlant(
+        MultibodyPlantConfig(
+            time_step=config.time_step_s,
+            discrete_contact_approximation=config.contact_approximation,
+            contact_model="hydroelastic_with_fallback",
+        ),
+        builder,
+    )
+    plant.mutable_gravity_field().set_gravity_vector(np.zeros(3))
+    arm_instance = arm.add_to_plant(plant)
+    skin_links = _wear_skin(plant, scene_graph, arm, arm_instance, config.contact)
+    clutter = plant.AddModelInstance("clutter")
+    for i in range(instance.num_objects):
+        X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, instance.yaw[i]), instance.p_WO[i])
+        name = f"object{i}"
+        if instance.movable[i]:
+            body = _add_sliding_body(
+                plant, clutter, name, instance.mass[i], instance.p_WO[i], config
+            )
+            X_BO = RigidTransform(RollPitchYaw(0.0, 0.0, instance.yaw[i]), np.zeros(3))
+        else:
+            body, X_BO = plant.world_body(), X_WO
+        shape = _make_shape(instance.shape[i], instance.size[i])
+        color = MOVABLE_COLOR if instance.movable[i] else FIXED_COLOR
+        plant.RegisterVisualGeometry(body, X_BO, shape, f"{name}_visual", color)
+        plant.RegisterCollisionGeometry(
+            body, X_BO, shape, f"{name}_collision", object_properties(config.contact)
+        )
+    plant.Finalize()
+    return Scene(
+        plant=plant,
+        scene_graph=scene_graph,
+        arm=arm_instance,
+        clutter=clutter,
+        skin_links=skin_links,
+    )
+
+
+def _wear_skin(
+    plant: MultibodyPlant,
+    scene_graph: SceneGraph,
+    arm: Arm,
+    arm_instance: ModelInstanceIndex,
+    contact: ContactConfig,
+) -> dict[GeometryId, int]:
+    """Makes the arm's collision geometry compliant; returns geometry -> link index."""
+    source = plant.get_source_id()
+    skin_links = {}
+    for link, name in enumerate(arm.link_names):
+        for geometry in plant.GetCollisionGeometriesForBody(
+            plant.GetBodyByName(name, arm_instance)
+        ):
+            scene_graph.AssignRole(
+                source, geometry, skin_properties(contact), RoleAssign.kReplace
+            )
+            skin_links[geometry] = link
+    return skin_links
+
+
+def _add_sliding_body(
+    plant: MultibodyPlant,
+    clutter: ModelInstanceIndex,
+    name: str,
+    mass: float,
+    p_WO: NDArray[np.float64],
+    config: SceneConfig,
+) -> RigidBody:
+    """Adds a body that slides in the ground plane against dry friction."""
+    carriage = plant.AddRigidBody(
+        f"{name}_carriage", clutter, SpatialInertia(0.0, np.zeros(3), UnitInertia(0.0, 0.0, 0.0))
+    )
+    body = plant.AddRigidBody(
+        name, clutter, SpatialInertia(mass, np.zeros(3), UnitInertia.SolidSphere(0.01))
+    )
+    # Friction acts along x and y apart, so its resistance to motion in a direction u is
+    # limit (|u_x| + |u_y|), which over all directions has the mean 4/pi limit.
+    limit = 0.25 * np.pi * config.ground_friction_N
+    gains = PdControllerGains(p=0.0, d=limit / config.ground_creep_m_per_s)
+    for axis, parent, child, offset in (
+        ("x", plant.world_frame(), carriage.body_frame(), p_WO[0]),
+        ("y", carriage.body_frame(), body.body_frame(), p_WO[1]),
+    ):
+        joint = plant.AddJoint(
+            PrismaticJoint(f"{name}_{axis}", parent, child, np.eye(3)["xy".index(axis)])
+        )
+        joint.set_default_translation(offset)
+        actuator = plant.AddJointActuator(joint.name(), joint, limit)
+        actuator.set_controller_gains(gains)
+    return body
+
+
+def _make_shape(shape: str, size: NDArray[np.float64]) -> Shape:
+    """Returns Drake's shape for a `ClutterInstance` entry."""
+    match shape:
+        case "cylinder":
+            return Cylinder(size[0], size[1])
+        case "box":
+            return Box(size)
+        case _:
+            return Sphere(size[0])

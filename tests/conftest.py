@@ -1,0 +1,22 @@
+"""What all tests share: plots without a display, hypothesis settings, a browser."""
+
+import os
+import shutil
+
+import pytest
+from hypothesis import settings
+
+os.environ["MPLBACKEND"] = "Agg"
+
+# A first example may pay for Drake's import or a plant; CI must not fail on a lucky draw.
+settings.register_profile("lic", deadline=None, derandomize=bool(os.environ.get("CI")))
+settings.load_profile("lic")
+
+
+@pytest.fixture(scope="session")
+def chromium() -> str:
+    """Path of a Chromium-like browser; tests that ask for it are skipped where there is none."""
+    for name in ("chromium", "chromium-browser", "google-chrome"):
+        if path := shutil.which(name):
+            return path
+    pytest.skip("Chromium is missing: apt-get install chromium")
