@@ -74,7 +74,7 @@ class HapticMpc:
 
         Zero when the limits contradict each other: the arm then holds its equilibrium.
         """
-        dq_d = solve(self.make_problem(state), scale=self.config.tip_step_m)
+        dq_d = solve(self.make_problem(state))
         return np.zeros_like(state.q) if dq_d is None else dq_d
 
     def pull_back(self, q: Vector, q_d: Vector) -> Vector:

@@ -1,12 +1,22 @@
-"""Small convex quadratic programs, solved with Clarabel through Drake."""
+"""Small strictly convex quadratic programs, solved exactly as least-distance problems.
+
+The controller's programs have few variables and cost terms that differ by six orders of
+magnitude, at which interior-point solvers with absolute tolerances give up (Drake's Clarabel:
+"InsufficientProgress" in most steps with contact). With the cost's Cholesky factor the problem
+becomes that of the point nearest to the origin in a polyhedron, which non-negative least squares
+solves in a finite number of steps (Lawson and Hanson, Solving Least Squares Problems, ch. 23).
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.solvers import ClarabelSolver, MathematicalProgram
+from scipy.optimize import nnls
 
 Vector = NDArray[np.float64]
+
+_INFEASIBLE = 1e-11
+"""A residual of the dual problem below this means that the constraints contradict each other."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,28 +42,37 @@ class QuadraticProgram:
     x_max: Vector
 
 
-_SOLVER = ClarabelSolver()
-
-
-def solve(problem: QuadraticProgram, scale: float) -> Vector | None:
+def solve(problem: QuadraticProgram) -> Vector | None:
     """Returns the minimiser, shape (n,), or None when the constraints contradict each other.
 
-    Args:
-        problem: The program.
-        scale: Typical size of x. The solver's tolerances are absolute, so the program is posed in
-            x / scale and its cost divided by scale^2.
+    Raises:
+        numpy.linalg.LinAlgError: P is not positive definite.
     """
-    if np.any(problem.row_min > problem.row_max) or np.any(problem.x_min > problem.x_max):
+    # With P = L L', y = L'x - y_free has the cost 1/2 |y|^2; y_free is the free optimum.
+    L_inv = np.linalg.inv(np.linalg.cholesky(problem.P))
+    y_free = -L_inv @ problem.c
+    rows = np.vstack([problem.A, np.eye(len(problem.c))]) @ L_inv.T
+    low = np.concatenate([problem.row_min, problem.x_min])
+    high = np.concatenate([problem.row_max, problem.x_max])
+    G = np.vstack([rows[np.isfinite(low)], -rows[np.isfinite(high)]])
+    h = np.concatenate([low[np.isfinite(low)], -high[np.isfinite(high)]]) - G @ y_free
+    norms = np.linalg.norm(G, axis=1)
+    empty = norms < 1e-12
+    if np.any(h[empty] > 1e-12):
         return None
-    program = MathematicalProgram()
-    x = program.NewContinuousVariables(len(problem.c))
-    program.AddQuadraticCost(problem.P, problem.c / scale, x, is_convex=True)
-    program.AddBoundingBoxConstraint(problem.x_min / scale, problem.x_max / scale, x)
-    if len(problem.A):
-        program.AddLinearConstraint(
-            problem.A, problem.row_min / scale, problem.row_max / scale, x
-        )
-    result = _SOLVER.Solve(program)
-    if not result.is_success():
+    y = _nearest_to_origin(G[~empty] / norms[~empty, None], h[~empty] / norms[~empty])
+    return None if y is None else L_inv.T @ (y + y_free)
+
+
+def _nearest_to_origin(G: Vector, h: Vector) -> Vector | None:
+    """Returns the shortest y with G y >= h, rows of G of unit length, or None."""
+    scale = np.max(h, initial=0.0)
+    if scale <= 0.0:
+        return np.zeros(G.shape[1])
+    E = np.vstack([G.T, h / scale])
+    f = np.append(np.zeros(G.shape[1]), 1.0)
+    multipliers, _ = nnls(E, f, maxiter=100 * len(h))
+    residual = E @ multipliers - f
+    if -residual[-1] < _INFEASIBLE:
         return None
-    return np.asarray(result.GetSolution(x)) * scale
+    return -scale * residual[:-1] / residual[-1]

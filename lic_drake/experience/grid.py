@@ -1,0 +1,212 @@
+"""`CollectionRequest`: which reaches a library is to hold; kept beside them as a small YAML file.
+
+The paper tries every start condition with every goal in every training environment (IV-A).
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from lic_drake.errors import LibraryError, RequestError
+from lic_drake.experience.files import readable_errors, write_atomically
+from lic_drake.experience.schema import scenario_text
+from lic_drake.reach.request import ReachRequest
+from lic_drake.reach.scenario import Scenario, parse_scenario
+from lic_drake.seeds import STREAMS
+
+REQUEST_FILE = "_collection.yaml"
+"""Name of the request's file in a library; the underscore hides it from Parquet readers."""
+
+MAX_ENVIRONMENTS = 1_000_000
+"""More environments than this in one library are refused as a slip of the keyboard."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CollectionRequest:
+    """All goals times all starts of a scenario's task, in some environments of a seed stream.
+
+    Attributes:
+        scenario: The scenario; its task gives the grids of goals and starts.
+        stream: Seed stream of the environments.
+        first_environment: Index of the first environment in its stream.
+        environments: Number of environments.
+        max_goals: Use at most this many goals of the grid, evenly thinned; None: all.
+        max_starts: Use at most this many starts of the grid, evenly thinned; None: all.
+
+    Raises:
+        RequestError: A value is out of its range.
+    """
+
+    scenario: Scenario
+    stream: str = "training"
+    first_environment: int = 0
+    environments: int = 20
+    max_goals: int | None = None
+    max_starts: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.stream not in STREAMS:
+            raise RequestError(f"unknown stream {self.stream!r}; choose one of {list(STREAMS)}")
+        if self.first_environment < 0:
+            raise RequestError(
+                f"the first environment must be 0 or more, got {self.first_environment}"
+            )
+        if not 1 <= self.environments <= MAX_ENVIRONMENTS:
+            raise RequestError(
+                f"environments must be from 1 to {MAX_ENVIRONMENTS}, got {self.environments}"
+            )
+        for name in ("max_goals", "max_starts"):
+            value = getattr(self, name)
+            if value is not None and value < 1:
+                raise RequestError(f"{name} must be 1 or more, got {value}")
+
+    @property
+    def environment_indices(self) -> range:
+        """Indices of the environments in their stream."""
+        return range(self.first_environment, self.first_environment + self.environments)
+
+    def goals(self) -> NDArray[np.float64]:
+        """Returns the goals p_WG, shape (n, 3), metres."""
+        return _thin(self.scenario.task.goal_area.grid(), self.max_goals)
+
+    def starts(self) -> NDArray[np.float64]:
+        """Returns the start poses x0, shape (m, 3), metres and radians.
+
+        Raises:
+            RequestError: The arm can take no start pose of the grid.
+        """
+        grid = self.scenario.task.start_line.grid(self.scenario.arm())
+        if len(grid) == 0:
+            raise RequestError(
+                f"{self.scenario.robot} can take no pose of the start line's grid;"
+                " change task.start_line in the scenario"
+            )
+        return _thin(grid, self.max_starts)
+
+    def reaches(self, environment: int) -> list[ReachRequest]:
+        """Returns the reaches into one environment; the starts vary fastest."""
+        starts = list(_triples(self.starts()))
+        return [
+            ReachRequest(
+                scenario=self.scenario,
+                stream=self.stream,
+                environment=environment,
+                goal=goal,
+                start=start,
+            )
+            for goal in _triples(self.goals())
+            for start in starts
+        ]
+
+    def refuse_unless_continuing(self, stored: "CollectionRequest", path: Path) -> None:
+        """Checks that a library that was begun with `stored` can go on with this request.
+
+        Raises:
+            LibraryError: Anything but a larger number of environments differs.
+        """
+        differences = [
+            f"{name} {theirs} instead of {ours}"
+            for name, theirs, ours in zip(
+                _values(self), _values(stored).values(), _values(self).values(), strict=True
+            )
+            if theirs != ours
+        ]
+        if self.environments < stored.environments:
+            differences.append(f"{stored.environments} environments, not {self.environments}")
+        if differences:
+            raise LibraryError(
+                f"{path} was begun with {', '.join(differences)}; give the same options"
+                " (or none) to go on, or another folder"
+            )
+
+
+def write_request(request: CollectionRequest, path: Path) -> None:
+    """Writes a request as YAML, with every value of its scenario.
+
+    Raises:
+        LibraryError: The file cannot be written.
+    """
+    data = {
+        **_values(request),
+        "environments": request.environments,
+        "scenario": yaml.safe_load(scenario_text(request.scenario)),
+    }
+    content = "# What `lic collect` puts into this folder; seeds and values are complete.\n"
+    content += yaml.safe_dump(data, sort_keys=False)
+    write_atomically(path, lambda temporary: _write_text(temporary, content))
+
+
+def read_request(path: Path) -> CollectionRequest:
+    """Reads a request from YAML.
+
+    Raises:
+        LibraryError: The file cannot be read or is not a request.
+        RequestError: A value is out of its range.
+        ScenarioError: Its scenario is not one that this lic_drake knows.
+    """
+    with readable_errors(path, "read"):
+        content = path.read_bytes()
+    try:
+        data = yaml.safe_load(content)
+    except (yaml.YAMLError, UnicodeDecodeError):
+        data = None
+    if not isinstance(data, dict) or not _is_request(data):
+        raise LibraryError(
+            f"{path} is not a collection request; restore it, or delete it and run lic collect"
+            " with the library's options"
+        )
+    digest = data.pop("scenario_digest")
+    scenario = parse_scenario(yaml.safe_dump(data.pop("scenario")), source=str(path))
+    if scenario.digest != digest:
+        raise LibraryError(
+            f"{path}: its scenario has digest {scenario.digest}, the library was begun with"
+            f" {digest}: the file was edited or another lic_drake wrote it; use another folder"
+        )
+    return CollectionRequest(scenario=scenario, **data)
+
+
+def _values(request: CollectionRequest) -> dict[str, Any]:
+    """Returns what must stay the same while a library grows."""
+    return {
+        "scenario_digest": request.scenario.digest,
+        "stream": request.stream,
+        "first_environment": request.first_environment,
+        "max_goals": request.max_goals,
+        "max_starts": request.max_starts,
+    }
+
+
+def _is_request(data: dict[Any, Any]) -> bool:
+    """Tells whether parsed YAML has exactly the keys of a request with values of their types."""
+    types: dict[str, tuple[type, ...]] = {
+        "scenario_digest": (str,),
+        "stream": (str,),
+        "first_environment": (int,),
+        "max_goals": (int, type(None)),
+        "max_starts": (int, type(None)),
+        "environments": (int,),
+        "scenario": (dict,),
+    }
+    return set(data) == set(types) and all(type(data[key]) in types[key] for key in types)
+
+
+def _write_text(path: Path, content: str) -> None:
+    path.write_text(content, encoding="utf-8")
+
+
+def _thin(grid: NDArray[np.float64], count: int | None) -> NDArray[np.float64]:
+    """Returns `count` rows from the middles of equal parts of a grid, or all of it."""
+    if count is None or count >= len(grid):
+        return grid
+    return grid[((np.arange(count) + 0.5) * len(grid) / count).astype(int)]
+
+
+def _triples(rows: NDArray[np.float64]) -> Iterator[tuple[float, float, float]]:
+    """Yields rows of shape (n, 3) as plain floats."""
+    for a, b, c in rows.tolist():
+        yield a, b, c

@@ -1,0 +1,155 @@
+"""The journal of a running shard: each finished reach as one line, so that a kill loses none."""
+
+import dataclasses
+import fcntl
+import json
+import os
+from pathlib import Path
+from types import TracebackType
+from typing import Any, BinaryIO, Self
+
+from lic_drake.experience.files import readable_errors
+from lic_drake.experience.schema import FIELDS, TUPLES
+from lic_drake.reach.request import ReachRecord
+
+SUFFIX = ".partial.jsonl"
+
+_SUCCESS = b'"success": true'
+
+
+def journal_path(shard: Path) -> Path:
+    """Returns the path of a shard's journal; the underscore hides it from Parquet readers."""
+    return shard.with_name(f"_{shard.stem}{SUFFIX}")
+
+
+class Journal:
+    """Appends records to a shard's journal and reads those of an earlier, interrupted run.
+
+    Only one process at a time holds a journal; opening waits for the other one to finish.
+
+    Attributes:
+        records: The records in the journal, in the order of their appearance.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Opens or creates the journal and drops what a kill left of an unfinished line.
+
+        Raises:
+            LibraryError: The file cannot be opened.
+        """
+        self._path = path
+        with readable_errors(path, "write"):
+            self._file = _open_locked(path)
+            self.records, length = _parse(self._file.read())
+            self._file.truncate(length)
+            self._file.seek(length)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._file.close()
+
+    def append(self, record: ReachRecord) -> None:
+        """Adds a finished reach; after the call a kill of this process cannot lose it.
+
+        Raises:
+            LibraryError: The line cannot be written (disk full); earlier lines are safe.
+        """
+        line = json.dumps(dataclasses.asdict(record)).encode() + b"\n"
+        with readable_errors(self._path, "write"):
+            _write_all(self._file, line)
+        self.records.append(record)
+
+    def delete(self) -> None:
+        """Removes the file, after the shard has been written."""
+        with readable_errors(self._path, "delete"):
+            self._path.unlink(missing_ok=True)
+
+
+class JournalTail:
+    """Counts the lines of a journal while another process writes them.
+
+    Attributes:
+        finished: Number of finished reaches seen so far.
+        successes: How many of them reached the goal.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._offset = 0
+        self.finished = 0
+        self.successes = 0
+
+    def poll(self) -> None:
+        """Looks for new lines."""
+        try:
+            with self._path.open("rb") as file:
+                file.seek(self._offset)
+                content = file.read()
+        except OSError:  # Not begun, or complete and deleted.
+            return
+        content = content[: content.rfind(b"\n") + 1]
+        self._offset += len(content)
+        self.finished += content.count(b"\n")
+        self.successes += content.count(_SUCCESS)
+
+
+def _open_locked(path: Path) -> BinaryIO:
+    """Opens a journal that nobody else holds, and which has not been deleted meanwhile."""
+    while True:
+        # Unbuffered: a line that failed to reach the disk must not be written again on close.
+        file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b", buffering=0)
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX)
+            if path.exists() and os.path.samestat(os.fstat(file.fileno()), path.stat()):
+                return file
+        except BaseException:
+            file.close()
+            raise
+        file.close()
+
+
+def _write_all(file: BinaryIO, line: bytes) -> None:
+    """Writes a line; a full disk may take a part of it before it refuses the rest."""
+    while line:
+        line = line[file.write(line) :]
+
+
+def _parse(content: bytes) -> tuple[list[ReachRecord], int]:
+    """Returns the records up to the first broken line, and the length of their lines."""
+    records: list[ReachRecord] = []
+    length = 0
+    for line in content.splitlines(keepends=True):
+        record = _parse_line(line)
+        if record is None:
+            break
+        records.append(record)
+        length += len(line)
+    return records, length
+
+
+def _parse_line(line: bytes) -> ReachRecord | None:
+    """Returns the record of a whole line, or None."""
+    if not line.endswith(b"\n"):
+        return None
+    try:
+        data: dict[str, Any] = json.loads(line)
+        for name in TUPLES:
+            data[name] = tuple(data[name])
+        return ReachRecord(**data) if list(data) == list(FIELDS) else None
+    except (ValueError, TypeError, KeyError):
+        return None
+
+
+def unfinished_reaches(library: Path) -> int:
+    """Returns the number of finished reaches in the journals of a library's folder."""
+    tails = [JournalTail(path) for path in library.glob(f"_*{SUFFIX}")]
+    for tail in tails:
+        tail.poll()
+    return sum(tail.finished for tail in tails)

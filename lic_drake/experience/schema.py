@@ -1,0 +1,175 @@
+"""The columns of an experience library, and rows to and from tables.
+
+The schema follows the fields of `ReachRecord`; units and descriptions stand in the metadata of
+each column. The table's metadata tells the schema's version and carries the whole scenario, so
+that a shard explains itself. Nothing that is read from a file is executed or unpickled.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import yaml
+
+import lic_drake
+from lic_drake.errors import LibraryError
+from lic_drake.reach.request import ReachRecord
+from lic_drake.reach.scenario import Scenario, to_dict
+
+SCHEMA_VERSION = 1
+"""Grows with every change of the columns or the metadata."""
+
+_TYPES = {
+    str: pa.string(),
+    int: pa.int64(),
+    float: pa.float64(),
+    bool: pa.bool_(),
+    tuple[float, ...]: pa.list_(pa.field("element", pa.float64(), nullable=False)),
+}
+
+FIELDS: dict[str, Any] = {item.name: item.type for item in dataclasses.fields(ReachRecord)}
+"""Column names and their Python types, in order."""
+
+TUPLES = [name for name, kind in FIELDS.items() if kind == tuple[float, ...]]
+"""Names of the list columns."""
+
+SCHEMA = pa.schema(
+    [
+        pa.field(item.name, _TYPES[FIELDS[item.name]], nullable=False, metadata=dict(item.metadata))
+        for item in dataclasses.fields(ReachRecord)
+    ]
+)
+"""The columns, without the metadata that differs between tables."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class TableHeader:
+    """The metadata of a table.
+
+    Attributes:
+        schema_version: Version of the columns.
+        lic_drake_version: Version that wrote the table.
+        scenario_digest: Digest of the scenario, `Scenario.digest`.
+        scenario: The whole scenario as YAML text, for `lic_drake.reach.scenario.parse_scenario`.
+    """
+
+    schema_version: int
+    lic_drake_version: str
+    scenario_digest: str
+    scenario: str
+
+
+def scenario_text(scenario: Scenario) -> str:
+    """Returns every value of a scenario as YAML; `parse_scenario` reads it back."""
+    return yaml.safe_dump(to_dict(scenario), sort_keys=False)
+
+
+def make_header(scenario: Scenario) -> TableHeader:
+    """Returns the metadata for rows of a scenario, as this version of lic_drake writes it."""
+    return TableHeader(
+        schema_version=SCHEMA_VERSION,
+        lic_drake_version=lic_drake.__version__,
+        scenario_digest=scenario.digest,
+        scenario=scenario_text(scenario),
+    )
+
+
+def to_table(records: Sequence[ReachRecord], header: TableHeader) -> pa.Table:
+    """Returns records as a table, one row each, in their order."""
+    columns = {name: [getattr(record, name) for record in records] for name in FIELDS}
+    metadata = {
+        f"lic_drake.{name}": str(value) for name, value in dataclasses.asdict(header).items()
+    }
+    return pa.Table.from_pydict(columns, schema=SCHEMA.with_metadata(metadata))
+
+
+def to_records(table: pa.Table) -> list[ReachRecord]:
+    """Returns the rows of a table; every float has the bits that it was written with."""
+    columns = {name: table.column(name).to_pylist() for name in FIELDS}
+    for name in TUPLES:
+        columns[name] = list(map(tuple, columns[name]))
+    return [
+        ReachRecord(**dict(zip(columns, row, strict=True)))
+        for row in zip(*columns.values(), strict=True)
+    ]
+
+
+def write_table(table: pa.Table, path: Path) -> None:
+    """Writes a table as a Parquet file with checksums."""
+    texts = [name for name, kind in FIELDS.items() if kind is str]
+    # Dictionaries would merge NaNs of different bits, so floats go without.
+    pq.write_table(
+        table, path, compression="zstd", use_dictionary=texts, write_page_checksum=True
+    )
+
+
+def read_header(path: Path) -> TableHeader:
+    """Reads the metadata of a library file.
+
+    Raises:
+        LibraryError: As `read_table`.
+    """
+    return _read(path, [])[0]
+
+
+def read_table(path: Path, columns: list[str] | None = None) -> pa.Table:
+    """Reads a library file.
+
+    Args:
+        path: A Parquet file.
+        columns: The columns to read; all of them by default.
+
+    Raises:
+        LibraryError: The file is missing, damaged, not part of an experience library, or of
+            another schema version.
+    """
+    return _read(path, columns)[1]
+
+
+def _read(path: Path, columns: list[str] | None) -> tuple[TableHeader, pa.Table]:
+    """Reads header and columns and checks what can be checked."""
+    try:
+        with pq.ParquetFile(path, page_checksum_verification=True) as file:
+            header = _check_schema(path, file.schema_arrow)
+            return header, file.read(columns=columns)
+    except (OSError, pa.ArrowException) as error:
+        if getattr(error, "errno", None) is not None:
+            raise LibraryError(f"cannot read {path}: {error.strerror}") from None
+        raise LibraryError(
+            f"{path} is damaged or not a Parquet file; delete it and collect its reaches again"
+        ) from error
+
+
+def _check_schema(path: Path, schema: pa.Schema) -> TableHeader:
+    """Returns the header of a schema that this version can read."""
+    try:
+        metadata = {k.decode(): v.decode() for k, v in (schema.metadata or {}).items()}
+        header = TableHeader(
+            schema_version=int(metadata["lic_drake.schema_version"]),
+            lic_drake_version=metadata["lic_drake.lic_drake_version"],
+            scenario_digest=metadata["lic_drake.scenario_digest"],
+            scenario=metadata["lic_drake.scenario"],
+        )
+    except (KeyError, ValueError):
+        raise LibraryError(
+            f"{path} is not part of an experience library (no lic_drake metadata);"
+            " move it out of the library's folder"
+        ) from None
+    if header.schema_version != SCHEMA_VERSION:
+        raise LibraryError(
+            f"{path} has schema version {header.schema_version}, written by lic_drake"
+            f" {header.lic_drake_version}; this lic_drake {lic_drake.__version__} reads version"
+            f" {SCHEMA_VERSION}: use that lic_drake, or collect the library again"
+        )
+    if not schema.equals(SCHEMA, check_metadata=False):
+        odd = sorted(set(SCHEMA.names) ^ set(schema.names)) or [
+            name for name in SCHEMA.names if schema.field(name).type != SCHEMA.field(name).type
+        ]
+        raise LibraryError(
+            f"{path} has other columns than this lic_drake writes ({', '.join(odd) or 'order'});"
+            " delete it and collect its reaches again"
+        )
+    return header
