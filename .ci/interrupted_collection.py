@@ -26,10 +26,10 @@ PATIENCE_S = 120.0
 Row = dict[str, Any]
 
 
-def run_lic(*arguments: str) -> str:
-    """Runs `lic` to its end and returns what it printed; a failure ends this script."""
+def run_lic(*arguments: str, status: int = 0) -> str:
+    """Runs `lic` to its end and returns what it printed; another exit status ends this script."""
     result = subprocess.run([LIC, *arguments], stdout=subprocess.PIPE, text=True)
-    if result.returncode != 0:
+    if result.returncode != status:
         sys.exit(f"lic {' '.join(arguments)} ended with status {result.returncode}")
     return result.stdout
 
@@ -96,7 +96,11 @@ def main() -> None:
     print(f"{len(before)} of {NUM_REACHES} reaches were on disk")
     if len(before) >= NUM_REACHES:
         sys.exit("the collection was too fast to be interrupted; make it larger")
-    run_lic("experience", "check", str(cut))
+    # Status 1: reaches are missing.
+    report = json.loads(run_lic("experience", "check", str(cut), "--json", status=1))
+    kept = report["reaches"] + report["journalled"]
+    if report["damaged"] or report["duplicates"] or kept != len(before):
+        sys.exit(f"the interrupted library is unsound: {report}")
 
     run_lic("collect", str(cut), *COLLECTION)
     after = read_rows(cut)

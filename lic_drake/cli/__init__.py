@@ -1,1 +1,1 @@
-"""."""
+"""The `lic` command: one module per subcommand, light to import."""

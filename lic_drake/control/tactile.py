@@ -34,7 +34,7 @@ def calc_taxel_forces(
 ) -> NDArray[np.float64]:
     """Returns the normal force on each taxel, shape (num_taxels,), N, compression positive.
 
-    A patch narrower than the taxels' pitch loads the single taxel at its centre of pressure, as
+    A patch on one or two neighbouring taxels loads the single taxel at its centre of pressure, as
     one contact does in the authors' simulator; a wider one loads the taxels under its faces.
     The forces of all taxels add up to the normal forces of all faces.
 
@@ -54,13 +54,13 @@ def calc_taxel_forces(
         R, p = R_RL[patch.link], p_RL[patch.link]
         p_RT = p + layout.p_LT[mine] @ R.T
         n_R = layout.n_L[mine] @ R.T
-        p_RC = magnitudes @ patch.p_RQ / total
-        extent = np.max(np.linalg.norm(patch.p_RQ - p_RC, axis=1))
-        if 2.0 * extent <= layout.pitch_m:
-            forces[mine[_nearest(p_RT, n_R, p_RC, patch.f_R.sum(axis=0))]] += total
-        else:
-            for p_RQ, f_R, magnitude in zip(patch.p_RQ, patch.f_R, magnitudes, strict=True):
-                forces[mine[_nearest(p_RT, n_R, p_RQ, f_R)]] += magnitude
+        taxels = _nearest(p_RT, n_R, patch.p_RQ, patch.f_R)
+        span = np.ptp(p_RT[taxels], axis=0)
+        if span @ span <= (1.5 * layout.pitch_m) ** 2:
+            p_RC = magnitudes @ patch.p_RQ / total
+            taxels = _nearest(p_RT, n_R, p_RC[None], patch.f_R.sum(axis=0)[None])
+            magnitudes = total
+        np.add.at(forces, mine[taxels], magnitudes)
     return forces
 
 
@@ -69,10 +69,10 @@ def _nearest(
     n_R: NDArray[np.float64],
     p_RQ: NDArray[np.float64],
     f_R: NDArray[np.float64],
-) -> int:
-    """Returns the taxel nearest to Q among those that face the force."""
-    distance = np.sum((p_RT - p_RQ) ** 2, axis=1)
-    facing = n_R @ f_R >= MAX_ANGLE_COS * np.linalg.norm(f_R)
-    if np.any(facing):
-        distance = np.where(facing, distance, np.inf)
-    return int(np.argmin(distance))
+) -> NDArray[np.intp]:
+    """Returns for each point Q the nearest taxel among those that face its force, shape (k,)."""
+    distance = np.sum((p_RQ[:, None] - p_RT) ** 2, axis=2)
+    facing = f_R @ n_R.T >= MAX_ANGLE_COS * np.linalg.norm(f_R, axis=1, keepdims=True)
+    # Where no taxel faces the force, the nearest one takes it: no force is lost.
+    facing |= ~np.any(facing, axis=1, keepdims=True)
+    return np.argmin(np.where(facing, distance, np.inf), axis=1)

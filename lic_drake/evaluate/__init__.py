@@ -1,1 +1,1 @@
-"""."""
+"""Evaluation: trials, figures and tables."""

@@ -203,10 +203,10 @@ def _thin(grid: NDArray[np.float64], count: int | None) -> NDArray[np.float64]:
     """Returns `count` rows from the middles of equal parts of a grid, or all of it."""
     if count is None or count >= len(grid):
         return grid
-    return grid[((np.arange(count) + 0.5) * len(grid) / count).astype(int)]
+    middles = ((np.arange(count) + 0.5) * len(grid) / count).astype(int)
+    return np.take(grid, middles, axis=0)
 
 
 def _triples(rows: NDArray[np.float64]) -> Iterator[tuple[float, float, float]]:
     """Yields rows of shape (n, 3) as plain floats."""
-    for a, b, c in rows.tolist():
-        yield a, b, c
+    yield from rows.tolist()

@@ -1,14 +1,12 @@
 """The journal of a running shard: each finished reach as one line, so that a kill loses none."""
 
 import dataclasses
-import fcntl
 import json
-import os
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO, Self
 
-from lic_drake.experience.files import readable_errors
+from lic_drake.experience.files import open_locked, readable_errors
 from lic_drake.experience.schema import FIELDS, TUPLES
 from lic_drake.reach.request import ReachRecord
 
@@ -39,7 +37,7 @@ class Journal:
         """
         self._path = path
         with readable_errors(path, "write"):
-            self._file = _open_locked(path)
+            self._file = open_locked(path, wait=True)
             self.records, length = _parse(self._file.read())
             self._file.truncate(length)
             self._file.seek(length)
@@ -98,21 +96,6 @@ class JournalTail:
         self._offset += len(content)
         self.finished += content.count(b"\n")
         self.successes += content.count(_SUCCESS)
-
-
-def _open_locked(path: Path) -> BinaryIO:
-    """Opens a journal that nobody else holds, and which has not been deleted meanwhile."""
-    while True:
-        # Unbuffered: a line that failed to reach the disk must not be written again on close.
-        file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b", buffering=0)
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX)
-            if path.exists() and os.path.samestat(os.fstat(file.fileno()), path.stat()):
-                return file
-        except BaseException:
-            file.close()
-            raise
-        file.close()
 
 
 def _write_all(file: BinaryIO, line: bytes) -> None:

@@ -1,13 +1,12 @@
 """One collection at a time in a library, and the sign by which it stops its workers."""
 
-import fcntl
 import os
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 from lic_drake.errors import LibraryError
-from lic_drake.experience.files import readable_errors
+from lic_drake.experience.files import open_locked, readable_errors
 
 LOCK_FILE = "_collecting"
 """Name of the lock in a library's folder; workers go on only while it is there.
@@ -29,12 +28,12 @@ class CollectionLock:
         self._path = library / LOCK_FILE
 
     def __enter__(self) -> Self:
-        with readable_errors(self._path, "write"):
-            self._file = self._path.open("ab")
         try:
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            self._file.close()
+            with readable_errors(self._path, "write"):
+                self._file = open_locked(self._path, wait=False)
+        except LibraryError as error:
+            if not isinstance(error.__cause__, BlockingIOError):
+                raise
             raise LibraryError(
                 f"another lic collect is at work on {self._library}; wait for it or stop it"
             ) from None

@@ -64,7 +64,8 @@ class TableHeader:
 
 def scenario_text(scenario: Scenario) -> str:
     """Returns every value of a scenario as YAML; `parse_scenario` reads it back."""
-    return yaml.safe_dump(to_dict(scenario), sort_keys=False)
+    text: str = yaml.safe_dump(to_dict(scenario), sort_keys=False)
+    return text
 
 
 def make_header(scenario: Scenario) -> TableHeader:
@@ -101,9 +102,7 @@ def write_table(table: pa.Table, path: Path) -> None:
     """Writes a table as a Parquet file with checksums."""
     texts = [name for name, kind in FIELDS.items() if kind is str]
     # Dictionaries would merge NaNs of different bits, so floats go without.
-    pq.write_table(
-        table, path, compression="zstd", use_dictionary=texts, write_page_checksum=True
-    )
+    pq.write_table(table, path, compression="zstd", use_dictionary=texts, write_page_checksum=True)
 
 
 def read_header(path: Path) -> TableHeader:

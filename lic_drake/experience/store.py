@@ -43,13 +43,13 @@ class ExperienceLibrary:
         Raises:
             LibraryError: There is no such folder or file, or it may not be read.
         """
-        if self.path.is_file():
-            return [self.path]
-        if not self.path.is_dir():
-            raise LibraryError(
-                f"no experience library at {self.path}; make one with: lic collect {self.path}"
-            )
         with readable_errors(self.path, "read"):
+            if self.path.is_file():
+                return [self.path]
+            if not self.path.is_dir():
+                raise LibraryError(
+                    f"no experience library at {self.path}; make one with: lic collect {self.path}"
+                )
             return sorted(
                 path
                 for path in self.path.iterdir()

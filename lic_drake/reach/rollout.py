@@ -63,7 +63,11 @@ class Environment:
 
 
 def simulate(
-    reach_diagram: ReachDiagram, scenario: Scenario, q0: Vector, p_WG: Vector
+    reach_diagram: ReachDiagram,
+    scenario: Scenario,
+    q0: Vector,
+    p_WG: Vector,
+    begin_s: float = 0.0,
 ) -> tuple[str, ReachTrace, str]:
     """Runs a diagram from rest at q0 until a stop rule ends the reach.
 
@@ -72,6 +76,8 @@ def simulate(
         scenario: Gives the control period and the stop rules.
         q0: First joint angles, shape (m,), radians.
         p_WG: Goal, shape (3,), metres.
+        begin_s: Time on the diagram's clock at which the reach begins, a whole number of seconds;
+            the trace's times count from there. Recordings put one reach after another with it.
 
     Returns:
         Outcome, trace and remark as `Environment.reach`.
@@ -79,6 +85,7 @@ def simulate(
     diagram, scene = reach_diagram.diagram, reach_diagram.scene
     arm = scenario.arm()
     context = reach_diagram.make_context(q0, p_WG)
+    context.SetTime(begin_s)
     query = cast(
         QueryObject,
         scene.scene_graph.get_query_output_port().Eval(
@@ -100,7 +107,7 @@ def simulate(
         try:
             if step == 0:
                 simulator.Initialize()
-            simulator.AdvanceTo(step * scenario.mpc.period_s)
+            simulator.AdvanceTo(begin_s + step * scenario.mpc.period_s)
         except RuntimeError as error:
             return "diverged", trace, " ".join(str(error).split())[:200]
         q = np.array(arm_state.Eval(context)[: len(q0)])
@@ -108,12 +115,11 @@ def simulate(
             return "diverged", trace, "joint angles are not finite"
         p_WE = arm.tip_position(q)
         forces = np.asarray(taxel_force.Eval(context))
-        trace.append(context.get_time(), q, p_WE, forces)
+        time_s = context.get_time() - begin_s
+        trace.append(time_s, q, p_WE, forces)
         if num_movable:
-            p_WO = np.asarray(clutter_state.Eval(context))[: 2 * num_movable].reshape(-1, 2)
-            farthest = float(np.sqrt(np.max(np.sum(p_WO**2, axis=1))))
-            trace.outermost_m = max(trace.outermost_m, farthest)
-        outcome = monitor.update(context.get_time(), p_WE, trace.peak_force[-1])
+            trace.follow(np.asarray(clutter_state.Eval(context))[: 2 * num_movable])
+        outcome = monitor.update(time_s, p_WE, trace.peak_force[-1])
         if outcome is not None:
             return outcome, trace, ""
         step += 1

@@ -48,10 +48,10 @@ def reaches_left_out(
     Args:
         instance: The whole environment.
         keep: What was simulated, shape (n,).
-        outermost_m: Largest distance from the base that the centre of a movable object had at
-            any control step, metres.
+        outermost_m: Largest distance from the base that the centre of a moved object had at any
+            control step, metres; 0 if none was moved.
     """
-    if np.all(keep):
+    if np.all(keep) or outermost_m == 0.0:
         return False
     radius = outer_radius(instance)
     inner_edge = np.linalg.norm(instance.p_WO[~keep, :2], axis=1) - radius[~keep]

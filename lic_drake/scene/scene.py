@@ -99,7 +99,7 @@ def add_scene(
             X_BO = RigidTransform(RollPitchYaw(0.0, 0.0, instance.yaw[i]), np.zeros(3))
         else:
             body, X_BO = plant.world_body(), X_WO
-        shape = _make_shape(instance.shape[i], instance.size[i])
+        shape = make_shape(instance.shape[i], instance.size[i])
         color = MOVABLE_COLOR if instance.movable[i] else FIXED_COLOR
         plant.RegisterVisualGeometry(body, X_BO, shape, f"{name}_visual", color)
         plant.RegisterCollisionGeometry(
@@ -168,7 +168,7 @@ def _add_sliding_body(
     return body
 
 
-def _make_shape(shape: str, size: NDArray[np.float64]) -> Shape:
+def make_shape(shape: str, size: NDArray[np.float64]) -> Shape:
     """Returns Drake's shape for a `ClutterInstance` entry."""
     match shape:
         case "cylinder":

@@ -1,0 +1,156 @@
+"""`lic experience`: looks at, checks and merges experience libraries."""
+
+import argparse
+import dataclasses
+import json
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from lic_drake.cli.arguments import Subparsers
+
+if TYPE_CHECKING:
+    from lic_drake.experience.summary import LibrarySummary
+
+EXIT_UNSOUND = 1
+
+
+def add_parser(subparsers: Subparsers) -> None:
+    """Adds the subcommand to the command line."""
+    parser = subparsers.add_parser(
+        "experience",
+        help="look at, check or merge experience libraries",
+        description="Looks at, checks or merges experience libraries: folders of Parquet files"
+        " with one row per reach, which also open in pandas.",
+        epilog="example: lic experience info out/cylinder",
+    )
+    actions = parser.add_subparsers(title="actions", metavar="ACTION", required=True)
+    _add_info(actions)
+    _add_check(actions)
+    _add_merge(actions)
+
+
+def _add_info(actions: Subparsers) -> None:
+    parser = actions.add_parser(
+        "info",
+        help="summarize a library",
+        description="Prints the size, success rate with 90 % Wilson interval, outcomes and origin"
+        " of a library.",
+        epilog="example: lic experience info out/cylinder --json",
+    )
+    _add_library(parser)
+    _add_json(parser)
+    parser.set_defaults(run=run_info)
+
+
+def _add_check(actions: Subparsers) -> None:
+    parser = actions.add_parser(
+        "check",
+        help="look for damaged, duplicate and missing reaches",
+        description="Reads every file of a library in full. Exit code 1 if a file is damaged, a"
+        " reach is there twice, scenarios are mixed, or a reach is missing.",
+        epilog="example: lic experience check out/cylinder",
+    )
+    _add_library(parser)
+    parser.add_argument(
+        "--request",
+        metavar="FILE",
+        type=Path,
+        help="collection request that the library must fulfil (default: the library's own)",
+    )
+    _add_json(parser)
+    parser.set_defaults(run=run_check)
+
+
+def _add_merge(actions: Subparsers) -> None:
+    parser = actions.add_parser(
+        "merge",
+        help="merge libraries of one scenario into one file",
+        description="Writes all reaches of libraries of one scenario into one Parquet file, which"
+        " is a library of its own. Equal duplicates are written once, unequal ones refused.",
+        epilog="example: lic experience merge out/all.parquet out/machine-1 out/machine-2",
+    )
+    parser.add_argument("output", metavar="OUTPUT", type=Path, help="new .parquet file")
+    parser.add_argument(
+        "sources", metavar="LIBRARY", type=Path, nargs="+", help="folder or file of a library"
+    )
+    parser.set_defaults(run=run_merge)
+
+
+def _add_library(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "library", metavar="LIBRARY", type=Path, help="folder or .parquet file of the library"
+    )
+
+
+def _add_json(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--json", action="store_true", help="print JSON (default: text)")
+
+
+def run_info(args: argparse.Namespace) -> int:
+    """Prints a library's summary."""
+    from lic_drake.experience.store import ExperienceLibrary
+    from lic_drake.experience.summary import summarize
+
+    summary = summarize(ExperienceLibrary(args.library))
+    if args.json:
+        values = {**dataclasses.asdict(summary), "success_rate": summary.success_rate}
+        print(json.dumps(values, indent=2))
+    else:
+        print("\n".join(_lines(args.library, summary)))
+    return 0
+
+
+def run_check(args: argparse.Namespace) -> int:
+    """Prints what is wrong with a library; returns 1 if anything is."""
+    from lic_drake.experience.check import check_library
+    from lic_drake.experience.grid import REQUEST_FILE, read_request
+    from lic_drake.experience.store import ExperienceLibrary
+
+    path = args.request or args.library / REQUEST_FILE
+    request = read_request(path) if args.request or os.path.exists(path) else None
+    report = check_library(ExperienceLibrary(args.library), request)
+    if args.json:
+        print(json.dumps({**dataclasses.asdict(report), "is_sound": report.is_sound}, indent=2))
+        return 0 if report.is_sound else EXIT_UNSOUND
+    missing = "unknown (no request)" if report.missing is None else report.missing
+    print(f"shards      {report.shards}")
+    print(f"reaches     {report.reaches}, and {report.journalled} in journals")
+    print(f"scenarios   {', '.join(report.scenarios) or 'none'}")
+    print(f"damaged     {len(report.damaged)}")
+    for line in report.damaged:
+        print(f"            {line}")
+    print(f"duplicates  {len(report.duplicates)} {' '.join(report.duplicates[:5])}".rstrip())
+    print(f"missing     {missing}")
+    print("sound" if report.is_sound else "NOT SOUND")
+    return 0 if report.is_sound else EXIT_UNSOUND
+
+
+def run_merge(args: argparse.Namespace) -> int:
+    """Merges libraries."""
+    from lic_drake.experience.merge import merge_libraries
+    from lic_drake.experience.store import ExperienceLibrary
+
+    rows = merge_libraries([ExperienceLibrary(path) for path in args.sources], args.output)
+    print(f"{rows} reaches in {args.output}")
+    return 0
+
+
+def _lines(library: Path, summary: "LibrarySummary") -> list[str]:
+    """Returns the lines of a summary."""
+    low, high = summary.success_interval
+    outcomes = ", ".join(f"{name} {count}" for name, count in summary.outcomes.items())
+    return [
+        f"library       {library} ({summary.shards} shards)",
+        f"scenario      {summary.category}, {summary.robot}, digest {summary.scenario}",
+        f"reaches       {summary.reaches}, and {summary.journalled} in journals",
+        f"grid          {summary.environments} environments ({', '.join(summary.streams)}),"
+        f" {summary.goals} goals, {summary.starts} starts",
+        f"success       {summary.successes} of {summary.reaches} = {summary.success_rate:.1%}"
+        f" (90 % interval {low:.1%} to {high:.1%})",
+        f"outcomes      {outcomes}",
+        f"time          {summary.simulated_s / 3600.0:.3g} h simulated in"
+        f" {summary.wall_time_s / 3600.0:.3g} h of wall time",
+        f"simulated by  lic_drake {', '.join(summary.lic_drake_versions)};"
+        f" Drake {', '.join(summary.drake_versions)}",
+    ]

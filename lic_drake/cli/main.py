@@ -1,0 +1,53 @@
+"""The `lic` command. A subcommand is a module with `add_parser` and `run`, and a line here."""
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+
+import lic_drake
+from lic_drake.cli import collect, experience
+from lic_drake.errors import LicError
+
+SUBCOMMANDS = (collect, experience)
+"""Modules with `add_parser(subparsers)`, which sets `run(args) -> int` as a parser default."""
+
+EXIT_USER_ERROR = 2
+EXIT_INTERRUPTED = 130
+EXIT_BROKEN_PIPE = 141
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs the command line and returns the exit code.
+
+    Args:
+        argv: Arguments without the program's name; those of the process by default.
+    """
+    args = _make_parser().parse_args(argv)
+    try:
+        code: int = args.run(args)
+        sys.stdout.flush()
+        return code
+    except LicError as error:
+        print(f"lic: error: {' '.join(str(error).split())}", file=sys.stderr)
+        return EXIT_USER_ERROR
+    except KeyboardInterrupt:
+        print("lic: interrupted", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:
+        # The reader has gone (`lic ... | head`); Python must not complain when it flushes at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_BROKEN_PIPE
+
+
+def _make_parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="lic",
+        description="Learning initial conditions for reaching into unknown clutter, on Drake.",
+        epilog="Each subcommand explains itself: lic collect --help",
+    )
+    parser.add_argument("--version", action="version", version=f"lic {lic_drake.__version__}")
+    subparsers = parser.add_subparsers(title="subcommands", metavar="SUBCOMMAND", required=True)
+    for subcommand in SUBCOMMANDS:
+        subcommand.add_parser(subparsers)
+    return parser

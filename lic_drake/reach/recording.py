@@ -1,0 +1,102 @@
+"""Records reaches as one HTML file that plays offline, contact forces included."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import Cylinder, Meshcat, MeshcatParams, Rgba, Sphere
+from pydrake.math import RigidTransform, RollPitchYaw
+
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.errors import LicError
+from lic_drake.reach.diagram import make_reach_diagram
+from lic_drake.reach.rollout import simulate
+from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.trace import ReachTrace
+from lic_drake.scene.culling import select_near, take
+from lic_drake.scene.scene import FIXED_COLOR, MOVABLE_COLOR, make_shape
+
+Vector = NDArray[np.float64]
+
+PAUSE_S = 1.0
+"""Time between two reaches of a recording, at least."""
+
+
+class ReachRecording:
+    """A Meshcat scene of one environment in which reaches are recorded one after another.
+
+    The simulation is the one of `lic_drake.reach.rollout`: objects that it leaves out are drawn,
+    too, but as scenery. Must be used from the thread that made it.
+    """
+
+    def __init__(
+        self, scenario: Scenario, instance: ClutterInstance, frames_per_second: float = 20.0
+    ) -> None:
+        self._scenario = scenario
+        self._meshcat = Meshcat(MeshcatParams(show_stats_plot=False))
+        keep = select_near(instance, scenario.arm().reach_m)
+        self._diagram = make_reach_diagram(
+            scenario, take(instance, keep), self._meshcat, frames_per_second
+        )
+        self._draw_scenery(take(instance, ~keep))
+        self._draw_start_line()
+        self._meshcat.SetProperty("/Background", "top_color", [0.97, 0.97, 0.98])
+        self._meshcat.SetProperty("/Background", "bottom_color", [0.97, 0.97, 0.98])
+        self._meshcat.SetProperty("/Grid", "visible", False)
+        self._meshcat.SetProperty("/Axes", "visible", False)
+        self._meshcat.SetCameraPose(np.array([-0.55, -0.45, 1.35]), np.array([0.42, 0.05, 0.0]))
+        self._meshcat.StartRecording(frames_per_second, set_visualizations_while_recording=False)
+        self._clock_s = 0.0
+
+    def add_reach(self, q0: Vector, p_WG: Vector) -> tuple[str, ReachTrace, str]:
+        """Simulates and records a reach in the environment as it was drawn.
+
+        Args:
+            q0: First joint angles, shape (m,), radians.
+            p_WG: Goal, shape (3,), metres.
+
+        Returns:
+            Outcome, trace and remark as `lic_drake.reach.rollout.simulate`.
+        """
+        self._draw_goal(p_WG)
+        outcome, trace, detail = simulate(
+            self._diagram, self._scenario, q0, p_WG, begin_s=self._clock_s
+        )
+        if trace.time_s:
+            self._clock_s += math.ceil(trace.time_s[-1] + PAUSE_S)
+        return outcome, trace, detail
+
+    def save(self, path: Path) -> None:
+        """Writes the recording.
+
+        Raises:
+            LicError: The file cannot be written.
+        """
+        self._meshcat.StopRecording()
+        self._meshcat.PublishRecording()
+        try:
+            path.write_text(self._meshcat.StaticHtml(), encoding="utf-8")
+        except OSError as error:
+            raise LicError(f"cannot write {path}: {error.strerror}") from None
+
+    def _draw_scenery(self, instance: ClutterInstance) -> None:
+        for i in range(instance.num_objects):
+            color = MOVABLE_COLOR if instance.movable[i] else FIXED_COLOR
+            path = f"/scenery/object{i}"
+            shape = make_shape(instance.shape[i], instance.size[i])
+            self._meshcat.SetObject(path, shape, Rgba(*color))
+            X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, instance.yaw[i]), instance.p_WO[i])
+            self._meshcat.SetTransform(path, X_WO)
+
+    def _draw_start_line(self) -> None:
+        lower, upper = self._scenario.task.start_line.lower, self._scenario.task.start_line.upper
+        ends = np.array([[lower[0], lower[1], -0.1], [upper[0], upper[1], -0.1]])
+        self._meshcat.SetLine("/task/start_line", ends.T, 3.0, Rgba(0.1, 0.65, 0.2, 1.0))
+
+    def _draw_goal(self, p_WG: Vector) -> None:
+        radius = self._scenario.stop.success_distance_m
+        self._meshcat.SetObject("/task/goal", Sphere(radius), Rgba(0.0, 0.7, 0.8, 0.9))
+        self._meshcat.SetTransform("/task/goal", RigidTransform(p_WG))
+        self._meshcat.SetObject("/task/pole", Cylinder(0.002, 0.3), Rgba(0.0, 0.7, 0.8, 0.9))
+        self._meshcat.SetTransform("/task/pole", RigidTransform(p_WG))

@@ -1,0 +1,110 @@
+"""What is known before a reach, and which start poses are possible in it."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lic_drake.errors import RequestError
+from lic_drake.reach.task import StartLine
+from lic_drake.robots.planar import PlanarArm
+
+Vector = NDArray[np.float64]
+
+RETRY_DISTANCE_M = 0.1
+"""A second attempt starts further than this from the first along the start line: the "local
+neighborhood" of paper VI-A, whose size it does not state; one grid step."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StartSet:
+    """The start poses x0 = (x, y, phi) that an arm can take on a start line (Eq. 4).
+
+    A pose is possible when it lies on the line within the line's bounds and the arm reaches it
+    within its joint limits. With phi within +-90 degrees the whole last link is then behind the
+    line, in the open space outside the clutter.
+    """
+
+    arm: PlanarArm
+    line: StartLine
+
+    @cached_property
+    def grid(self) -> Vector:
+        """The discrete starts of the experience library, shape (n, 3), metres and radians."""
+        return self.line.grid(self.arm)
+
+    @cached_property
+    def lattice(self) -> Vector:
+        """A denser set of possible starts, 0.025 m and 7.5 degrees apart, shape (n, 3)."""
+        return self.scan(33, 25)
+
+    def scan(self, num_y: int, num_phi: int) -> Vector:
+        """Returns the possible poses of a lattice over the line's bounds, shape (n, 3)."""
+        y = np.linspace(self.line.lower[1], self.line.upper[1], num_y)
+        phi = np.linspace(self.line.lower[2], self.line.upper[2], num_phi)
+        poses = [np.array([self.line.x_m, yi, phi_i]) for yi in y for phi_i in phi]
+        return np.array([x0 for x0 in poses if self.arm.solve_ik(x0) is not None])
+
+    def contains(self, x0: Vector, tolerance: float = 1e-6) -> bool:
+        """Tells whether the arm can start at x0; uses the closed-form inverse kinematics."""
+        inside = np.all(x0 >= self.line.lower - tolerance) and np.all(
+            x0 <= self.line.upper + tolerance
+        )
+        return bool(inside) and self.arm.solve_ik(x0) is not None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Situation:
+    """The goal, the possible starts, and where the last attempt started if it failed.
+
+    Attributes:
+        p_WG: Goal, shape (3,), metres.
+        starts: The possible start poses.
+        failed: Start poses of failed attempts, each (x, y, phi).
+    """
+
+    p_WG: Vector
+    starts: StartSet
+    failed: tuple[Vector, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.p_WG.shape != (3,) or not np.all(np.isfinite(self.p_WG)):
+            raise RequestError(f"a goal is three finite numbers in metres, got {self.p_WG}")
+
+    def allowed(self, x0: Vector) -> NDArray[np.bool_]:
+        """Tells which poses, shape (n, 3), are far enough from all failed starts, shape (n,)."""
+        far = np.ones(len(x0), dtype=bool)
+        for failed in self.failed:
+            far &= np.abs(x0[:, 1] - failed[1]) > RETRY_DISTANCE_M + 1e-9
+        return far
+
+    def free_intervals(self) -> list[tuple[float, float]]:
+        """Returns the parts of the start line, (y_min, y_max), away from all failed starts."""
+        intervals = [(float(self.starts.line.lower[1]), float(self.starts.line.upper[1]))]
+        margin = RETRY_DISTANCE_M + 1e-6
+        for failed in self.failed:
+            cut = []
+            for low, high in intervals:
+                cut += [(low, min(high, failed[1] - margin)), (max(low, failed[1] + margin), high)]
+            intervals = [(low, high) for low, high in cut if low <= high]
+        return intervals
+
+
+@dataclass(frozen=True, kw_only=True)
+class Selection:
+    """A chosen initial condition.
+
+    Attributes:
+        x0: Hand pose (x, y, phi), metres and radians.
+        q: Joint angles that take it, shape (m,), radians.
+        probability: Estimated probability of success; None for strategies without an estimate.
+        method: Name of the strategy.
+        seconds: Wall time of the selection.
+    """
+
+    x0: Vector
+    q: Vector
+    probability: float | None
+    method: str
+    seconds: float
