@@ -134,7 +134,7 @@ def _read(path: Path, columns: list[str] | None) -> tuple[TableHeader, pa.Table]
         with pq.ParquetFile(path, page_checksum_verification=True) as file:
             header = _check_schema(path, file.schema_arrow)
             return header, file.read(columns=columns)
-    except (OSError, pa.ArrowException) as error:
+    except (OSError, UnicodeDecodeError, pa.ArrowException) as error:
         if getattr(error, "errno", None) is not None:
             raise LibraryError(f"cannot read {path}: {error.strerror}") from None
         raise LibraryError(

@@ -10,7 +10,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.geometry import QueryObject
-from pydrake.systems.analysis import Simulator
+from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 import lic_drake
 from lic_drake.clutter.instance import ClutterInstance
@@ -102,6 +102,11 @@ def simulate(
     monitor = StopMonitor(scenario.stop, p_WG, scenario.mpc.period_s)
     trace = ReachTrace()
     simulator = Simulator(diagram, context)
+    if scenario.scene.time_step_s == 0.0:
+        simulator_config = SimulatorConfig(
+            integration_scheme="cenic", accuracy=scenario.scene.cenic_accuracy
+        )
+        ApplySimulatorConfig(simulator_config, simulator)
     step = 0
     while True:
         try:

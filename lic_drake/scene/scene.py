@@ -39,6 +39,8 @@ class SceneConfig:
 
     # Step of the discrete plant, seconds; 0 makes it continuous (for the CENIC integrator).
     time_step_s: float = 0.0025
+    # Accuracy of the CENIC integrator, which a continuous plant needs.
+    cenic_accuracy: float = 1e-3
     # Drake's discrete contact approximation.
     contact_approximation: str = "lagged"
     # Dry friction of a movable object on the ground, N (authors' simulator), and the speed up to
@@ -146,7 +148,7 @@ def _add_sliding_body(
 ) -> RigidBody:
     """Adds a body that slides in the ground plane against dry friction."""
     carriage = plant.AddRigidBody(
-        f"{name}_carriage", clutter, SpatialInertia(0.0, np.zeros(3), UnitInertia(0.0, 0.0, 0.0))
+        f"{name}_carriage", clutter, SpatialInertia(1e-3 * mass, np.zeros(3), UnitInertia.SolidSphere(0.01))
     )
     body = plant.AddRigidBody(
         name, clutter, SpatialInertia(mass, np.zeros(3), UnitInertia.SolidSphere(0.01))
