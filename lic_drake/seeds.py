@@ -20,15 +20,16 @@ def make_generator(stream: str, purpose: str, *indices: int) -> np.random.Genera
     Args:
         stream: One of `STREAMS`.
         purpose: What is drawn, for instance a clutter category or "goal"; any text.
-        indices: Non-negative integers, for instance the environment's index.
+        indices: Integers from 0 to 2^32 - 1, for instance the environment's index; always
+            the same number of them for a purpose, because NumPy takes (5,) and (5, 0) for equal.
 
     Raises:
-        RequestError: The stream is unknown or an index is negative.
+        RequestError: The stream is unknown or an index is out of range.
     """
     if stream not in STREAMS:
         raise RequestError(f"unknown seed stream {stream!r}; choose one of {', '.join(STREAMS)}")
-    if any(index < 0 for index in indices):
-        raise RequestError(f"seed indices must be 0 or more, got {list(indices)}")
+    if not all(0 <= index < 2**32 for index in indices):
+        raise RequestError(f"seed indices must be from 0 to 2^32 - 1, got {list(indices)}")
     # CRC-32 gives every purpose a fixed number; Python's own hash() changes between processes.
     return np.random.default_rng(
         [STREAMS.index(stream), zlib.crc32(purpose.encode()), *map(int, indices)]

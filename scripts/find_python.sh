@@ -3,7 +3,7 @@
 #
 # $PYTHON decides if it is set. Otherwise each version is looked for on the PATH (python3.12, then a
 # python3 of that version) and in pyenv's versions folder. The first version that runs wins; 3.12
-# comes first because Drake supports it longest.
+# comes first because CI runs it.
 set -u
 
 # 0: usable; 1: not CPython >= 3.12 with the GIL, or does not run (a pyenv shim may lead nowhere);

@@ -15,3 +15,19 @@ def positive_int(text: str) -> int:
     if value < 1:
         raise argparse.ArgumentTypeError(f"needs a whole number of 1 or more, got {text!r}")
     return value
+
+
+def add_scenario_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds --scenario and --set."""
+    parser.add_argument(
+        "--scenario",
+        metavar="NAME|FILE",
+        default="cylinder-clutter",
+        help="shipped scenario or path of a .yaml file (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--set",
+        metavar="YAML",
+        default="",
+        help='values put over the scenario, for instance "{stop: {timeout_s: 20}}" (SI units)',
+    )

@@ -43,7 +43,8 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--set",
         metavar="YAML",
-        help='values put over the scenario, for instance "{stop: {timeout_s: 20}}" (SI units)',
+        help='values put over the scenario in SI units, for instance "{stop: {timeout_s: 20}}"'
+        " (default: none)",
     )
     parser.add_argument(
         "--environments", metavar="N", type=int, help="number of environments (default: 20)"

@@ -6,10 +6,10 @@ import sys
 from collections.abc import Sequence
 
 import lic_drake
-from lic_drake.cli import collect, experience
+from lic_drake.cli import collect, experience, reach
 from lic_drake.errors import LicError
 
-SUBCOMMANDS = (collect, experience)
+SUBCOMMANDS = (reach, collect, experience)
 """Modules with `add_parser(subparsers)`, which sets `run(args) -> int` as a parser default."""
 
 EXIT_USER_ERROR = 2

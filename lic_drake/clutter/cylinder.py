@@ -37,12 +37,13 @@ class CylinderClutter:
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0):
                 raise ScenarioError(f"{name} must be a positive number, got {value}")
-        corners = np.array([self.lower, self.upper], dtype=float)
-        if corners.shape != (2, 2) or not np.all(np.isfinite(corners)):
+        if not len(self.lower) == len(self.upper) == 2 or not np.all(
+            np.isfinite([*self.lower, *self.upper])
+        ):
             raise ScenarioError(
                 f"lower and upper must be [x, y] in metres, got {self.lower}, {self.upper}"
             )
-        if np.any(corners[0] >= corners[1]):
+        if self.lower[0] >= self.upper[0] or self.lower[1] >= self.upper[1]:
             raise ScenarioError(f"lower {self.lower} must be below upper {self.upper} in x and y")
 
     def sample(self, rng: np.random.Generator) -> ClutterInstance:

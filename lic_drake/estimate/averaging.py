@@ -37,11 +37,17 @@ def average_rows(Z: Vector, f: Vector) -> AveragedRows:
     return AveragedRows(Z=sorted_Z[first], rate=rate, count=count)
 
 
-def binomial_variance(rate: Vector, count: Vector) -> Vector:
-    """Returns the variance p (1 - p) / n of success rates, shape (m,).
+def reach_variance(rows: AveragedRows) -> float:
+    """Returns the mean binomial variance p (1 - p) of one reach around its pair's rate.
 
-    p is the mean of the posterior under Jeffreys' prior, (n rate + 1/2) / (n + 1), so that
-    rates of 0 and 1 do not count as free of noise.
+    It is the pooled variance within rows, so that a row of n reaches has the noise
+    reach_variance / n. One variance for all: with each row's own p (1 - p) / n, rows that
+    succeeded by luck every time would count as the most certain. One pseudo-reach with the
+    variance of all reaches together keeps it above zero, and stands alone where no pair was
+    tried twice.
     """
-    p = (count * rate + 0.5) / (count + 1.0)
-    return p * (1.0 - p) / count
+    num_reaches = rows.count.sum()
+    total_rate = (rows.count @ rows.rate + 0.5) / (num_reaches + 1.0)
+    within = rows.count @ (rows.rate * (1.0 - rows.rate))
+    free = num_reaches - len(rows.count)
+    return float((within + total_rate * (1.0 - total_rate)) / (free + 1.0))

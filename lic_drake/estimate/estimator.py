@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Protocol, Self
 
+from numpy.typing import ArrayLike
+
 from lic_drake.estimate.checks import Vector
 
 
@@ -22,19 +24,21 @@ class Prediction:
 class Predictor(Protocol):
     """An estimate of P(success) that can be fitted and asked, as cross-validation needs it."""
 
-    def fit(self, Z: Vector, f: Vector) -> Self:
+    def fit(self, Z: ArrayLike, f: ArrayLike, environment: ArrayLike | None = None) -> Self:
         """Learns from rows and returns itself.
 
         Args:
             Z: Features, shape (n, d), see `lic_drake.estimate.features`.
             f: Successes, shape (n,), each 0 or 1.
+            environment: Index of each row's environment, shape (n,). Reaches in one environment
+                succeed and fail together; an estimator that knows them smooths more.
 
         Raises:
             EstimateError: The rows are unusable.
         """
         ...
 
-    def predict(self, Z: Vector) -> Prediction:
+    def predict(self, Z: ArrayLike) -> Prediction:
         """Estimates P(success) for queries Z, shape (n, d).
 
         Raises:
@@ -46,7 +50,7 @@ class Predictor(Protocol):
 class SuccessEstimator(Predictor, Protocol):
     """F(s, x0) of paper III-D with its gradient, for the optimisation of Eq. (4)."""
 
-    def value_and_gradient(self, z: Vector) -> tuple[float, Vector]:
+    def value_and_gradient(self, z: ArrayLike) -> tuple[float, Vector]:
         """Returns the estimate at z, shape (d,), and its gradient by z, shape (d,).
 
         The value is not clipped into [0, 1]: a clipped one is flat where an optimiser needs

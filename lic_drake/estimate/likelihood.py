@@ -11,7 +11,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dpotri
 from scipy.optimize import minimize
 
-from lic_drake.estimate.checks import EstimateError, Vector, feature_scale
+from lic_drake.estimate.checks import Vector, feature_scale
 from lic_drake.seeds import make_generator
 
 # Bounds of theta are per standard deviation of a feature: from nearly a straight line through
@@ -23,17 +23,23 @@ _MAX_SEARCH_ROWS = 300
 
 @dataclass(frozen=True, kw_only=True)
 class Hyperparameters:
-    """What the marginal likelihood decides.
+    """The prior and the noise of a process.
 
     Attributes:
         theta: Decay of the correlation per unit of each feature, shape (d,).
         signal_variance: Prior variance s of the success probability around its mean.
         noise_floor: Variance tau of a row beyond binomial noise and smooth surface.
+        reach_variance: Noise variance of a single reach; a row of n has the n-th part.
     """
 
     theta: Vector
     signal_variance: float
     noise_floor: float
+    reach_variance: float
+
+    def noise(self, count: Vector) -> Vector:
+        """Returns the noise variance of rows with these numbers of reaches, shape (m,)."""
+        return self.reach_variance / count + self.noise_floor
 
 
 def coordinate_distances(Z: Vector) -> Vector:
@@ -78,7 +84,9 @@ def negative_log_likelihood(
     return float(value), gradient
 
 
-def fit_hyperparameters(Z: Vector, y: Vector, noise_variance: Vector) -> Hyperparameters:
+def fit_hyperparameters(
+    Z: Vector, y: Vector, count: Vector, reach_variance: float
+) -> Hyperparameters:
     """Maximises the marginal likelihood with L-BFGS-B from several starts, within bounds.
 
     The starts run on at most 300 of the rows; the best result is improved on all of them.
@@ -86,13 +94,12 @@ def fit_hyperparameters(Z: Vector, y: Vector, noise_variance: Vector) -> Hyperpa
     Args:
         Z: Features, shape (n, d).
         y: Observed rates, shape (n,).
-        noise_variance: Known variance of each rate, shape (n,).
-
-    Raises:
-        EstimateError: The likelihood is not finite anywhere it was tried.
+        count: Number of reaches in each row, shape (n,).
+        reach_variance: Noise variance of a single reach.
     """
     scale = feature_scale(Z)
     Z = Z / scale
+    noise = reach_variance / count
     num_features = Z.shape[1]
     bounds = np.log([_BOUNDS["theta"]] * num_features + [_BOUNDS["signal"], _BOUNDS["floor"]])
     variance = float(np.clip(np.var(y), *_BOUNDS["signal"]))
@@ -106,7 +113,7 @@ def fit_hyperparameters(Z: Vector, y: Vector, noise_variance: Vector) -> Hyperpa
         result = minimize(
             negative_log_likelihood,
             np.clip(start, *bounds.T),
-            args=(coordinate_distances(Z[rows]), y[rows], noise_variance[rows]),
+            args=(coordinate_distances(Z[rows]), y[rows], noise[rows]),
             jac=True,
             method="L-BFGS-B",
             bounds=bounds,
@@ -114,12 +121,13 @@ def fit_hyperparameters(Z: Vector, y: Vector, noise_variance: Vector) -> Hyperpa
         return float(result.fun), np.asarray(result.x)
 
     found = [improve(start, few) for start in starts]
-    value, best = min(found, key=lambda pair: pair[0])
+    _, best = min(found, key=lambda pair: pair[0])
     if len(few) < len(Z):
-        value, best = improve(best, np.arange(len(Z)))
-    if not np.isfinite(value):
-        raise EstimateError(f"the marginal likelihood of {len(Z)} rows is not finite")
+        _, best = improve(best, np.arange(len(Z)))
     theta, signal, floor = np.exp(best[:-2]) / scale, np.exp(best[-2]), np.exp(best[-1])
     return Hyperparameters(
-        theta=theta, signal_variance=float(signal), noise_floor=float(floor)
+        theta=theta,
+        signal_variance=float(signal),
+        noise_floor=float(floor),
+        reach_variance=reach_variance,
     )

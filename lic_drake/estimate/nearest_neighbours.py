@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-from lic_drake.estimate.averaging import AveragedRows, average_rows
+from lic_drake.estimate.averaging import average_rows
 from lic_drake.estimate.checks import (
     EstimateError,
     Vector,
@@ -16,6 +16,7 @@ from lic_drake.estimate.checks import (
     feature_scale,
 )
 from lic_drake.estimate.estimator import Prediction
+from lic_drake.estimate.folds import selection_folds
 from lic_drake.seeds import make_generator
 
 _MAX_SELECTION_POINTS = 2000
@@ -26,15 +27,14 @@ _TRUNCATION = 2.5
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Fitted:
-    """Distinct points in units of `scale`, with their rates and counts."""
+class _Points:
+    """Distinct feature vectors, divided by `scale`, with their success rates and counts."""
 
     tree: cKDTree
     points: Vector
     rate: Vector
     count: Vector
     scale: Vector
-    bandwidth: float
 
 
 class NearestNeighbours:
@@ -45,8 +45,8 @@ class NearestNeighbours:
     Distances are Euclidean in features divided by their standard deviation.
 
     The spread is the standard deviation of the weighted average if each reach is an independent
-    draw (Kish's effective sample size, Jeffreys' prior); it knows nothing of the bias that
-    averaging over neighbours brings.
+    draw (Kish's effective sample size, Jeffreys' prior). It knows nothing of the luck that
+    reaches in one environment share, nor of the bias that averaging over neighbours brings.
 
     Attributes:
         neighbours: K, the number of distinct feature vectors averaged.
@@ -58,8 +58,8 @@ class NearestNeighbours:
         Args:
             neighbours: See the class.
             bandwidth: Standard deviation h of the weights exp(-d^2 / (2 h^2)), in standard
-                deviations of the features. By default `fit` takes the one that predicts each
-                distinct point best from the others: selected starts lie between grid points.
+                deviations of the features. By default `fit` takes the one that best predicts
+                environments that were held out.
 
         Raises:
             EstimateError: K below 1, or a bandwidth that is not positive.
@@ -71,42 +71,45 @@ class NearestNeighbours:
             )
         self.neighbours = neighbours
         self._given = bandwidth
-        self._model: _Fitted | None = None
+        self._chosen: float | None = bandwidth
+        self._points: _Points | None = None
 
     @property
     def bandwidth(self) -> float:
-        """The bandwidth in use.
+        """The bandwidth in use, in standard deviations of the features.
 
         Raises:
-            EstimateError: Not fitted yet.
+            EstimateError: Neither given nor fitted yet.
         """
-        return self._fitted().bandwidth
+        if self._chosen is None:
+            raise EstimateError("the bandwidth is not chosen yet; call fit(Z, f) first")
+        return self._chosen
 
-    def fit(self, Z: ArrayLike, f: ArrayLike) -> Self:
-        """Learns from features Z, shape (n, d), and successes f, shape (n,); returns itself."""
-        rows = average_rows(*checked_rows(Z, f))
+    def fit(self, Z: ArrayLike, f: ArrayLike, environment: ArrayLike | None = None) -> Self:
+        """Learns from features Z, shape (n, d), and successes f, shape (n,); see `Predictor`."""
+        Z, f = checked_rows(Z, f)
+        rows = average_rows(Z, f)
         scale = feature_scale(rows.Z)
         points = rows.Z / scale
         tree = cKDTree(points)
-        self._model = _Fitted(
-            tree=tree,
-            points=points,
-            rate=rows.rate,
-            count=rows.count,
-            scale=scale,
-            bandwidth=self._given or select_bandwidth(tree, rows, self.neighbours),
+        if self._given is None:
+            fold = selection_folds(environment, len(f))
+            _, point = tree.query(Z / scale)
+            self._chosen = _select_bandwidth(tree, self.neighbours, point, f, fold)
+        self._points = _Points(
+            tree=tree, points=points, rate=rows.rate, count=rows.count, scale=scale
         )
         return self
 
     def predict(self, Z: ArrayLike) -> Prediction:
-        """Estimates P(success) for queries Z, shape (n, d); see `SuccessEstimator`."""
-        model = self._fitted()
-        queries = checked_queries(Z, len(model.scale)) / model.scale
-        distance, index = model.tree.query(queries, k=self._neighbour_ranks())
-        weight = _weights(distance, model.bandwidth)
-        weighted_count = weight * model.count[index]
+        """Estimates P(success) for queries Z, shape (n, d); see `Predictor`."""
+        at = self._fitted()
+        queries = checked_queries(Z, len(at.scale)) / at.scale
+        distance, index = _query(at.tree, queries, self.neighbours)
+        weight = _weights(distance, self.bandwidth)
+        weighted_count = weight * at.count[index]
         total = weighted_count.sum(axis=1)
-        probability = np.sum(weighted_count * model.rate[index], axis=1) / total
+        probability = np.sum(weighted_count * at.rate[index], axis=1) / total
         sample_size = total**2 / np.sum(weight * weighted_count, axis=1)
         p = (sample_size * probability + 0.5) / (sample_size + 1.0)
         return Prediction(
@@ -120,52 +123,30 @@ class NearestNeighbours:
         Both belong to the neighbours at hand: the estimate is smooth while these stay the same
         and has a small jump where they change.
         """
-        model = self._fitted()
-        query = checked_queries(np.atleast_2d(z), len(model.scale))[0] / model.scale
-        distance, index = model.tree.query(query, k=self._neighbour_ranks())
-        weight = _weights(distance, model.bandwidth) * model.count[index]
+        at = self._fitted()
+        query = checked_queries(np.atleast_2d(z), len(at.scale))[0] / at.scale
+        distance, index = _query(at.tree, query, self.neighbours)
+        weight = _weights(distance, self.bandwidth) * at.count[index]
         weight /= weight.sum()
-        rate = model.rate[index]
+        rate = at.rate[index]
         value = weight @ rate
-        pull = (weight * (rate - value)) @ (model.points[index] - query)
-        return float(value), pull / (model.bandwidth**2 * model.scale)
+        pull = (weight * (rate - value)) @ (at.points[index] - query)
+        return float(value), pull / (self.bandwidth**2 * at.scale)
 
-    def _neighbour_ranks(self) -> list[int]:
-        # As a list the tree returns an axis of neighbours even for one of them.
-        return list(range(1, min(self.neighbours, len(self._fitted().rate)) + 1))
-
-    def _fitted(self) -> _Fitted:
-        if self._model is None:
+    def _fitted(self) -> _Points:
+        if self._points is None:
             raise EstimateError("the nearest neighbours have no rows yet; call fit(Z, f) first")
-        return self._model
+        return self._points
 
 
-def select_bandwidth(tree: cKDTree, rows: AveragedRows, neighbours: int) -> float:
-    """Returns the bandwidth with the least squared error of points predicted from the others.
-
-    Args:
-        tree: The distinct points in standard deviations.
-        rows: Their rates and counts, in the same order.
-        neighbours: Number of neighbours averaged.
-    """
-    num_points = len(rows.rate)
-    if num_points == 1:
-        return 1.0
-    rng = make_generator("training", "points for the choice of a bandwidth")
-    tried = rng.permutation(num_points)[:_MAX_SELECTION_POINTS]
-    distance, index = tree.query(tree.data[tried], k=min(neighbours, num_points - 1) + 1)
-    distance, index = distance[:, 1:], index[:, 1:]  # the nearest is the point itself
-    nearest, farthest = np.median(distance[:, 0]), np.median(distance[:, -1])
-    smallest = 0.5 * nearest
-    largest = max(smallest, farthest / _TRUNCATION)
-    rate, count = rows.rate[index], rows.count[index]
-
-    def error(bandwidth: float) -> float:
-        weight = _weights(distance, bandwidth) * count
-        predicted = np.sum(weight * rate, axis=1) / np.sum(weight, axis=1)
-        return float(rows.count[tried] @ (rows.rate[tried] - predicted) ** 2)
-
-    return float(min(np.geomspace(smallest, largest, _NUM_BANDWIDTHS), key=error))
+def _query(
+    tree: cKDTree, queries: Vector, neighbours: int
+) -> tuple[Vector, NDArray[np.intp]]:
+    """Returns distances and indices of the nearest points, shape (..., k), nearest first."""
+    k = min(neighbours, tree.n)
+    distance, index = tree.query(queries, k=k)
+    # For a single neighbour the tree leaves out their axis.
+    return (distance[..., None], index[..., None]) if k == 1 else (distance, index)
 
 
 def _weights(distance: Vector, bandwidth: float) -> Vector:
@@ -173,3 +154,39 @@ def _weights(distance: Vector, bandwidth: float) -> Vector:
     nearest = distance[..., :1]
     weights: Vector = np.exp(-0.5 * (distance**2 - nearest**2) / bandwidth**2)
     return weights
+
+
+def _select_bandwidth(
+    tree: cKDTree, neighbours: int, point: NDArray[np.intp], f: Vector, fold: NDArray[np.intp]
+) -> float:
+    """Returns the bandwidth with the least squared error in folds that were held out.
+
+    Args:
+        tree: The distinct points.
+        neighbours: Number of points averaged.
+        point: Point of each reach, shape (n,).
+        f: Success of each reach, shape (n,).
+        fold: Fold of each reach, shape (n,).
+    """
+    if tree.n == 1:
+        return 1.0
+    shape = (tree.n, int(fold.max()) + 1)
+    cell = np.ravel_multi_index((point, fold), shape)
+    size = shape[0] * shape[1]
+    tries = np.bincount(cell, minlength=size).reshape(shape).astype(float)
+    successes = np.bincount(cell, weights=f, minlength=size).reshape(shape)
+    # What each fold is predicted from: everything but itself.
+    seen_tries = tries.sum(axis=1, keepdims=True) - tries
+    seen_successes = successes.sum(axis=1, keepdims=True) - successes
+
+    rng = make_generator("training", "points for the choice of a bandwidth")
+    tried = rng.permutation(tree.n)[:_MAX_SELECTION_POINTS]
+    distance, index = _query(tree, tree.data[tried], neighbours)
+    smallest = 0.5 * np.median(distance[:, 1])
+    largest = max(smallest, np.median(distance[:, -1]) / _TRUNCATION)
+
+    def error(bandwidth: float) -> float:
+        weight = csr_array(...)
+        return 0.0
+
+    return float(min(np.geomspace(smallest, largest, _NUM_BANDWIDTHS), key=error))

@@ -3,7 +3,6 @@
 The paper tries every start condition with every goal in every training environment (IV-A).
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -52,9 +51,9 @@ class CollectionRequest:
     def __post_init__(self) -> None:
         if self.stream not in STREAMS:
             raise RequestError(f"unknown stream {self.stream!r}; choose one of {list(STREAMS)}")
-        if self.first_environment < 0:
+        if not 0 <= self.first_environment < 2**31:
             raise RequestError(
-                f"the first environment must be 0 or more, got {self.first_environment}"
+                f"the first environment must be from 0 to 2^31 - 1, got {self.first_environment}"
             )
         if not 1 <= self.environments <= MAX_ENVIRONMENTS:
             raise RequestError(
@@ -90,7 +89,7 @@ class CollectionRequest:
 
     def reaches(self, environment: int) -> list[ReachRequest]:
         """Returns the reaches into one environment; the starts vary fastest."""
-        starts = list(_triples(self.starts()))
+        starts = _triples(self.starts())
         return [
             ReachRequest(
                 scenario=self.scenario,
@@ -207,6 +206,6 @@ def _thin(grid: NDArray[np.float64], count: int | None) -> NDArray[np.float64]:
     return np.take(grid, middles, axis=0)
 
 
-def _triples(rows: NDArray[np.float64]) -> Iterator[tuple[float, float, float]]:
-    """Yields rows of shape (n, 3) as plain floats."""
-    yield from rows.tolist()
+def _triples(rows: NDArray[np.float64]) -> list[tuple[float, float, float]]:
+    """Returns rows of shape (n, 3) as plain floats."""
+    return [(a, b, c) for a, b, c in rows.tolist()]

@@ -6,6 +6,7 @@ that a shard explains itself. Nothing that is read from a file is executed or un
 """
 
 import dataclasses
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -135,8 +136,10 @@ def _read(path: Path, columns: list[str] | None) -> tuple[TableHeader, pa.Table]
             header = _check_schema(path, file.schema_arrow)
             return header, file.read(columns=columns)
     except (OSError, UnicodeDecodeError, pa.ArrowException) as error:
-        if getattr(error, "errno", None) is not None:
-            raise LibraryError(f"cannot read {path}: {error.strerror}") from None
+        # Damage makes pyarrow raise OSErrors, too, but without an error number.
+        number = getattr(error, "errno", None)
+        if number is not None:
+            raise LibraryError(f"cannot read {path}: {os.strerror(number)}") from None
         raise LibraryError(
             f"{path} is damaged or not a Parquet file; delete it and collect its reaches again"
         ) from error

@@ -148,7 +148,7 @@ class ExperienceLibrary:
             LibraryError: The folder cannot be written (permission, disk full), or a record
                 belongs to another scenario.
         """
-        if Path(name).name != name or name.startswith((".", "_")):
+        if not name or Path(name).name != name or name.startswith((".", "_")):
             raise LibraryError(f"{name!r} cannot be a shard's name; use letters and digits")
         header = make_header(scenario)
         others = {record.scenario for record in records} - {header.scenario_digest}

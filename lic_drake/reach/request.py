@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from lic_drake.errors import RequestError
 from lic_drake.reach.scenario import Scenario
 
 OUTCOMES = ("reached", "stuck", "force", "timeout", "diverged", "invalid_start")
@@ -94,3 +95,20 @@ class ReachRecord:
     def x0(self) -> NDArray[np.float64]:
         """The start pose (x, y, phi), metres and radians."""
         return np.array([self.start_x, self.start_y, self.start_phi])
+
+
+def check_goal(scenario: Scenario, p_WG: NDArray[np.float64]) -> None:
+    """Refuses goals that no reach could come to.
+
+    Raises:
+        RequestError: The goal is not finite or further away than the arm reaches.
+    """
+    if p_WG.shape != (3,) or not np.all(np.isfinite(p_WG)):
+        raise RequestError(f"a goal is two finite numbers in metres, got {p_WG.tolist()}")
+    reach = scenario.arm().reach_m + scenario.stop.success_distance_m
+    distance = float(np.linalg.norm(p_WG))
+    if distance > reach:
+        raise RequestError(
+            f"the goal ({p_WG[0]:g}, {p_WG[1]:g}) m is {distance:.3f} m from the base and the arm"
+            f" reaches {reach:.3f} m; choose a nearer goal"
+        )

@@ -84,9 +84,10 @@ class PlanarArmKinematics:
         phi = float(x0[2])
         wrist = np.array([x0[0] - l3 * np.cos(phi), x0[1] - l3 * np.sin(phi)])
         cos_q2 = (wrist @ wrist - l1**2 - l2**2) / (2.0 * l1 * l2)
-        if abs(cos_q2) > 1.0:
+        if abs(cos_q2) > 1.0 + 1e-12:  # Rounding must not refuse a straight elbow.
             return None
-        for q2 in (np.arccos(cos_q2), -np.arccos(cos_q2)):
+        bend = np.arccos(np.clip(cos_q2, -1.0, 1.0))
+        for q2 in (bend, -bend):
             first_link = np.arctan2(wrist[1], wrist[0]) - np.arctan2(
                 l2 * np.sin(q2), l1 + l2 * np.cos(q2)
             )

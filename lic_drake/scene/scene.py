@@ -38,7 +38,7 @@ class SceneConfig:
     """How the world is simulated."""
 
     # Step of the discrete plant, seconds; 0 makes it continuous (for the CENIC integrator).
-    time_step_s: float = 0.0025
+    time_step_s: float = 0.005
     # Accuracy of the CENIC integrator, which a continuous plant needs.
     cenic_accuracy: float = 1e-3
     # Drake's discrete contact approximation.

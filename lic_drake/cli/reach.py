@@ -1,0 +1,131 @@
+"""`lic reach`: simulates one reach."""
+
+import argparse
+import dataclasses
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from lic_drake.cli.arguments import Subparsers, add_scenario_arguments
+
+if TYPE_CHECKING:
+    from lic_drake.reach.request import ReachRecord, ReachRequest
+
+
+def add_parser(subparsers: Subparsers) -> None:
+    """Adds the subcommand to the command line."""
+    parser = subparsers.add_parser(
+        "reach",
+        help="simulate one reach and print its record",
+        description="Simulates one reach from a start pose to a goal in a random environment and"
+        " prints its record. The exit code is 0 whether or not the goal was reached.",
+        epilog="example: lic reach --goal 0.6 0.1 --start-y 0.0 --start-phi 60 --environment 3",
+    )
+    add_scenario_arguments(parser)
+    parser.add_argument(
+        "--stream", default="evaluation", help="seed stream of the environment (%(default)s)"
+    )
+    parser.add_argument(
+        "--environment", type=int, default=0, metavar="N", help="its index (default: 0)"
+    )
+    parser.add_argument(
+        "--goal",
+        type=float,
+        nargs=2,
+        default=(0.6, 0.0),
+        metavar=("X", "Y"),
+        help="goal in metres, x into the clutter, y to the left (default: 0.6 0)",
+    )
+    parser.add_argument(
+        "--start-y",
+        type=float,
+        default=0.0,
+        metavar="Y",
+        help="start position on the start line, metres (default: 0)",
+    )
+    parser.add_argument(
+        "--start-phi",
+        type=float,
+        default=60.0,
+        metavar="DEG",
+        help="start orientation of the hand, degrees from straight ahead (default: 60)",
+    )
+    parser.add_argument("--json", action="store_true", help="print the record as a JSON object")
+    parser.add_argument(
+        "--record", type=Path, metavar="FILE.html", help="write a recording that plays offline"
+    )
+    parser.add_argument(
+        "--diagram", type=Path, metavar="FILE.svg", help="draw the Drake diagram (.svg .png .pdf)"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Runs the subcommand and returns the exit code."""
+    import numpy as np
+
+    from lic_drake.errors import RequestError
+    from lic_drake.reach.request import ReachRequest, check_goal
+    from lic_drake.reach.rollout import run_reach
+    from lic_drake.reach.scenario import load_scenario
+
+    scenario = load_scenario(args.scenario, args.set)
+    p_WG = np.array([*args.goal, 0.0])
+    check_goal(scenario, p_WG)
+    x0 = np.array([scenario.task.start_line.x_m, args.start_y, np.deg2rad(args.start_phi)])
+    if not np.all(np.isfinite(x0)):
+        raise RequestError(
+            f"a start is two finite numbers, got y {args.start_y} m, phi {args.start_phi} degrees"
+        )
+    request = ReachRequest(
+        scenario=scenario,
+        stream=args.stream,
+        environment=args.environment,
+        goal=(float(p_WG[0]), float(p_WG[1]), 0.0),
+        start=(float(x0[0]), float(x0[1]), float(x0[2])),
+    )
+    if args.diagram is not None:
+        _draw(request, args.diagram)
+    record = run_reach(request)
+    if record.outcome == "invalid_start":
+        raise RequestError(
+            f"cannot start at y {args.start_y:g} m, phi {args.start_phi:g} degrees:"
+            f" {record.detail}; `lic select` lists starts that are possible"
+        )
+    if args.record is not None:
+        _record(request, args.record)
+    print(json.dumps(dataclasses.asdict(record)) if args.json else _describe(record))
+    return 0
+
+
+def _draw(request: "ReachRequest", path: Path) -> None:
+    from lic_drake.reach.diagram import make_reach_diagram
+    from lic_drake.reach.diagram_drawing import draw_diagram
+
+    instance = request.scenario.sample_instance(request.stream, request.environment)
+    draw_diagram(make_reach_diagram(request.scenario, instance).diagram, path)
+
+
+def _record(request: "ReachRequest", path: Path) -> None:
+    import numpy as np
+
+    from lic_drake.reach.recording import ReachRecording
+
+    scenario = request.scenario
+    q0 = scenario.arm().solve_ik(np.array(request.start))
+    if q0 is None:
+        return
+    recording = ReachRecording(
+        scenario, scenario.sample_instance(request.stream, request.environment)
+    )
+    recording.add_reach(q0, np.array(request.goal))
+    recording.save(path)
+
+
+def _describe(record: "ReachRecord") -> str:
+    return (
+        f"{record.outcome} after {record.duration_s:.2f} s ({record.wall_time_s:.2f} s of wall"
+        f" time); nearest to the goal {1000 * record.min_distance:.0f} mm;"
+        f" peak force {record.peak_force:.1f} N, mean contact {record.mean_force:.1f} N,"
+        f" up to {record.peak_contacts} taxels loaded"
+    )

@@ -1,0 +1,78 @@
+"""A Gaussian process with constant mean and L1 kernel, given rows of success rates."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
+
+from lic_drake.estimate.averaging import AveragedRows
+from lic_drake.estimate.checks import Vector
+from lic_drake.estimate.kernels import l1_correlation, l1_correlation_with_gradient
+from lic_drake.estimate.likelihood import Hyperparameters
+
+
+@dataclass(frozen=True, kw_only=True)
+class Posterior:
+    """The process given m rows; C is their covariance, noise included.
+
+    Attributes:
+        Z: Features, shape (m, d).
+        hyperparameters: Of the prior and the noise.
+        lower: Cholesky factor of C, shape (m, m).
+        prior_mean: Generalised-least-squares mean mu.
+        alpha: C^-1 (y - mu), shape (m,).
+        ones_weight: C^-1 1, shape (m,).
+    """
+
+    Z: Vector
+    hyperparameters: Hyperparameters
+    lower: Vector
+    prior_mean: float
+    alpha: Vector
+    ones_weight: Vector
+
+    def mean(self, Z: Vector) -> Vector:
+        """Returns the posterior mean for queries Z, shape (n, d): shape (n,)."""
+        mean: Vector = self.prior_mean + self.alpha @ self._covariance(Z)
+        return mean
+
+    def standard_deviation(self, Z: Vector) -> Vector:
+        """Returns the posterior standard deviation of the surface, mu's uncertainty included."""
+        covariance = self._covariance(Z)
+        explained = solve_triangular(self.lower, covariance, lower=True, check_finite=False)
+        mean_part = (1.0 - self.ones_weight @ covariance) ** 2 / self.ones_weight.sum()
+        variance = (
+            self.hyperparameters.signal_variance - np.sum(explained**2, axis=0) + mean_part
+        )
+        return np.sqrt(np.maximum(variance, 0.0))
+
+    def mean_and_gradient(self, z: Vector) -> tuple[float, Vector]:
+        """Returns the posterior mean at z, shape (d,), and its gradient, shape (d,)."""
+        correlation, slope = l1_correlation_with_gradient(z, self.Z, self.hyperparameters.theta)
+        weight = self.hyperparameters.signal_variance * self.alpha
+        return float(self.prior_mean + weight @ correlation), weight @ slope
+
+    def _covariance(self, Z: Vector) -> Vector:
+        """Returns the prior covariance of the rows with queries, shape (m, n)."""
+        correlation = l1_correlation(self.Z, Z, self.hyperparameters.theta)
+        return self.hyperparameters.signal_variance * correlation
+
+
+def condition(rows: AveragedRows, hyperparameters: Hyperparameters) -> Posterior:
+    """Returns the process given rows of success rates."""
+    covariance = hyperparameters.signal_variance * l1_correlation(
+        rows.Z, rows.Z, hyperparameters.theta
+    )
+    covariance[np.diag_indices(len(rows.Z))] += hyperparameters.noise(rows.count)
+    lower, _ = cho_factor(covariance, lower=True, overwrite_a=True, check_finite=False)
+    targets = np.column_stack([rows.rate, np.ones(len(rows.rate))])
+    weights = cho_solve((lower, True), targets, check_finite=False)
+    prior_mean = float(weights[:, 0].sum() / weights[:, 1].sum())
+    return Posterior(
+        Z=rows.Z,
+        hyperparameters=hyperparameters,
+        lower=lower,
+        prior_mean=prior_mean,
+        alpha=weights[:, 0] - prior_mean * weights[:, 1],
+        ones_weight=weights[:, 1],
+    )

@@ -1,0 +1,161 @@
+import os
+import pty
+import subprocess
+import sys
+import termios
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+
+import pytest
+from fake_reach import FakeReach, comparable, expected_records, make_request
+
+import lic_drake.experience.collect as dut
+from lic_drake.cli.main import main
+from lic_drake.experience.grid import REQUEST_FILE, read_request
+from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.reach.scenario import load_scenario
+
+SMALL = ["--max-goals", "4", "--max-starts", "3"]
+
+Collect = Callable[..., int]
+
+
+@pytest.fixture
+def reach(tmp_path: Path) -> FakeReach:
+    return FakeReach(log=tmp_path / "calls")
+
+
+@pytest.fixture
+def collect(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, reach: FakeReach) -> Collect:
+    """Runs `lic collect` with fake reaches on threads."""
+    make_executor = partial(ThreadPoolExecutor, max_workers=1)
+    fake = partial(dut.collect, reach=reach, make_executor=make_executor)
+    monkeypatch.setattr(dut, "collect", fake)
+    return lambda *options: main(["collect", str(tmp_path / "new"), *options])
+
+
+def test_collect_makes_a_library_and_says_what_it_holds(
+    collect: Collect, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert collect("--environments", "3", *SMALL) == 0
+    output, error = capsys.readouterr()
+    assert "3 environments x 4 goals x 3 starts = 36 reaches into" in output
+    assert "36 of 36 reaches (36 new in " in output
+    assert "(90 % interval " in output
+    assert error == ""
+    assert comparable(ExperienceLibrary(tmp_path / "new").records()) == expected_records(
+        make_request()
+    )
+
+
+def test_an_existing_library_goes_on_without_options_or_with_more_environments(
+    collect: Collect, reach: FakeReach, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert collect("--environments", "1", *SMALL) == 0
+    assert collect() == 0
+    assert len(reach.calls()) == 12
+    assert collect("--environments", "2") == 0
+    assert len(reach.calls()) == 24
+    assert "24 of 24 reaches (12 new" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--max-goals", "5"], "was begun with max_goals 4 instead of 5; give the same options"),
+        (["--stream", "holdout"], "stream training instead of holdout"),
+        (["--first", "1"], "first_environment 0 instead of 1"),
+        (["--environments", "1"], "2 environments, not 1"),
+        (["--set", "{stop: {timeout_s: 20}}"], "scenario_digest"),
+        (["--stream", "tuning"], "unknown stream 'tuning'; choose one of"),
+        (["--environments", "0"], "environments must be from 1 to"),
+        (["--set", "{stop: {patience: 20}}"], "patience"),
+        (["--scenario", "jungle"], "no scenario 'jungle'"),
+    ],
+)
+def test_a_different_request_is_refused_in_one_line(
+    collect: Collect,
+    reach: FakeReach,
+    capsys: pytest.CaptureFixture[str],
+    options: list[str],
+    message: str,
+) -> None:
+    assert collect("--environments", "2", *SMALL) == 0
+    capsys.readouterr()
+    assert collect(*options) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.startswith("lic: error: ")
+    assert error.count("\n") == 1
+    assert len(reach.calls()) == 24
+
+
+def test_options_reach_the_request(collect: Collect, tmp_path: Path) -> None:
+    overrides = "{mpc: {preset: ijrr_2013}}"
+    options = ["--environments", "1", "--first", "7", "--stream", "holdout", "--set", overrides]
+    assert collect("--scenario", "cylinder-clutter", *options, *SMALL) == 0
+    assert read_request(tmp_path / "new" / REQUEST_FILE) == make_request(
+        scenario=load_scenario("cylinder-clutter", overrides),
+        first_environment=7,
+        environments=1,
+        stream="holdout",
+    )
+
+
+def test_failed_environments_are_listed_and_make_exit_code_1(
+    monkeypatch: pytest.MonkeyPatch,
+    collect: Collect,
+    reach: FakeReach,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    failing = FakeReach(log=reach.log, failing_environment=1)
+    monkeypatch.setattr(dut, "collect", partial(dut.collect, reach=failing))
+    assert collect("--environments", "3", *SMALL) == 1
+    output, error = capsys.readouterr()
+    assert "24 of 36 reaches" in output
+    assert "lic: environment 1 failed: ArithmeticError: no such environment\n" in error
+    assert "the library is incomplete; run the same command to try again" in error
+
+
+@pytest.mark.parametrize("path", ["file", "file/below"])
+def test_a_path_that_cannot_be_a_folder_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], path: str
+) -> None:
+    (tmp_path / "file").touch()
+    assert main(["collect", str(tmp_path / path)]) == 2
+    assert capsys.readouterr().err.startswith("lic: error: cannot create the folder")
+
+
+@pytest.mark.parametrize("workers", ["0", "-1", "two", "1.5"])
+def test_a_number_of_workers_must_be_positive(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], workers: str
+) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["collect", str(tmp_path), "--workers", workers])
+    assert end.value.code == 2
+    assert f"needs a whole number of 1 or more, got '{workers}'" in capsys.readouterr().err
+
+
+def test_a_real_reach_is_collected_with_a_progress_bar_on_a_terminal(tmp_path: Path) -> None:
+    terminal, child_side = pty.openpty()
+    termios.tcsetwinsize(terminal, (24, 120))
+    options = ["--environments", "1", "--max-goals", "1", "--max-starts", "1", "--set"]
+    overrides = "{stop: {timeout_s: 0.2}, clutter: {num_movable: 0, num_fixed: 1}}"
+    library = str(tmp_path / "new")
+    process = subprocess.Popen(
+        [sys.executable, "-m", "lic_drake", "collect", library, *options, overrides],
+        stdout=subprocess.PIPE,
+        stderr=child_side,
+    )
+    output = process.communicate(timeout=120)[0].decode()
+    os.close(child_side)
+    shown = os.read(terminal, 100_000).decode()
+    os.close(terminal)
+    assert process.returncode == 0
+    assert "1 of 1 reaches (1 new" in output
+    assert "| 1/1" in shown
+    assert "reaches/min" in shown
+    (record,) = ExperienceLibrary(library).records()
+    assert (record.outcome, record.duration_s) == ("timeout", pytest.approx(0.2, abs=0.05))

@@ -1,0 +1,58 @@
+import dataclasses
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from lic_drake.clutter import registry
+from lic_drake.clutter.cylinder import CylinderClutter
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.clutter.registry import category_names, get_category, register_category
+from lic_drake.errors import ScenarioError
+from lic_drake.reach.scenario import parse_scenario
+
+
+@dataclasses.dataclass(kw_only=True)
+class OneSphere:
+    """A category as a user would add it."""
+
+    radius_m: float = 0.05
+
+    def sample(self, rng: np.random.Generator) -> ClutterInstance:
+        return ClutterInstance(
+            category="one-sphere",
+            shape=("sphere",),
+            size=np.array([[self.radius_m, 0.0, 0.0]]),
+            p_WO=np.append(rng.uniform(0.4, 0.8, 2), 0.0)[None],
+            yaw=np.zeros(1),
+            mass=np.ones(1),
+            movable=np.ones(1, dtype=bool),
+        )
+
+
+@pytest.fixture
+def _restore(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.setattr(registry, "_CATEGORIES", dict(registry._CATEGORIES))
+    yield
+
+
+def test_cylinder_clutter_is_known() -> None:
+    assert get_category("cylinder-clutter") is CylinderClutter
+    assert "cylinder-clutter" in category_names()
+
+
+def test_an_unknown_category_is_named_with_the_known_ones() -> None:
+    with pytest.raises(ScenarioError, match=r"'jungle'.*cylinder-clutter"):
+        get_category("jungle")
+
+
+@pytest.mark.usefixtures("_restore")
+def test_a_category_added_by_one_call_can_be_used_in_a_scenario() -> None:
+    register_category("one-sphere", OneSphere)
+    scenario = parse_scenario(
+        "{category: one-sphere, robot: planar-arm, clutter: {radius_m: 0.03}}"
+    )
+    instance = scenario.sample_instance("training", 0)
+    assert instance.category == "one-sphere"
+    assert instance.size[0, 0] == 0.03
+    assert "one-sphere" in category_names()

@@ -1,0 +1,55 @@
+import errno
+import os
+from pathlib import Path
+
+import pytest
+
+from lic_drake.errors import LibraryError
+from lic_drake.experience import files
+from lic_drake.experience.files import open_locked, write_atomically
+
+
+@pytest.mark.parametrize("call", ["fsync", "replace"])
+@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EACCES])
+def test_a_refused_write_leaves_the_old_file_and_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: str, code: int
+) -> None:
+    path = tmp_path / "file"
+    path.write_text("old")
+
+    def refuse(*_: object) -> None:
+        raise OSError(code, os.strerror(code))
+
+    monkeypatch.setattr(files.os, call, refuse)
+    with pytest.raises(LibraryError, match=f"cannot write {path}: {os.strerror(code)}; check"):
+        write_atomically(path, lambda temporary: temporary.write_text("new") and None)
+    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("file", "old")]
+
+
+def test_an_interrupted_write_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    path.write_text("old")
+
+    def interrupt(temporary: Path) -> None:
+        temporary.write_text("ne")
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_atomically(path, interrupt)
+    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("file", "old")]
+
+
+def test_what_a_killed_writer_left_is_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    (tmp_path / ".file.tmp").write_text("a longer half of a file")
+    write_atomically(path, lambda temporary: temporary.write_text("new") and None)
+    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("file", "new")]
+
+
+def test_a_locked_file_is_refused_until_it_is_closed(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    first = open_locked(path, wait=False)
+    with pytest.raises(BlockingIOError):
+        open_locked(path, wait=False)
+    first.close()
+    open_locked(path, wait=False).close()

@@ -1,0 +1,134 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from fake_reach import make_request
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lic_drake.errors import LibraryError, RequestError
+from lic_drake.experience.grid import CollectionRequest, read_request, write_request
+from lic_drake.reach.scenario import load_scenario
+
+SCENARIO = load_scenario("cylinder-clutter")
+
+
+def test_the_papers_library_has_18900_different_reaches() -> None:
+    request = CollectionRequest(scenario=SCENARIO)
+    assert (len(request.goals()), len(request.starts())) == (45, 21)
+    assert len(request.environment_indices) * len(request.reaches(0)) == 18_900
+    assert len({item.key for e in (0, 19) for item in request.reaches(e)}) == 2 * 945
+
+
+def test_every_goal_is_tried_from_every_start() -> None:
+    request = make_request(first_environment=5, stream="holdout")
+    reaches = request.reaches(6)
+    pairs = {(item.goal, item.start) for item in reaches}
+    assert len(reaches) == len(pairs) == 4 * 3
+    assert {item.goal for item in reaches} == set(map(tuple, request.goals().tolist()))
+    assert {(item.stream, item.environment) for item in reaches} == {("holdout", 6)}
+    assert list(request.environment_indices) == [5, 6, 7]
+
+
+@given(st.integers(1, 60), st.integers(1, 60))
+def test_thinning_is_even_and_keeps_the_order(max_goals: int, max_starts: int) -> None:
+    request = make_request(max_goals=max_goals, max_starts=max_starts)
+    for thinned, grid in (
+        (request.goals(), SCENARIO.task.goal_area.grid()),
+        (request.starts(), SCENARIO.task.start_line.grid(SCENARIO.arm())),
+    ):
+        count = min(max_goals if len(grid) == 45 else max_starts, len(grid))
+        rows = [np.flatnonzero((grid == row).all(axis=1))[0] for row in thinned]
+        gaps = np.diff([-1, *rows, len(grid)])
+        assert len(rows) == count
+        assert np.all(gaps[1:-1] >= len(grid) // count)
+        assert np.all(gaps[1:-1] <= -(-len(grid) // count))
+        assert abs(gaps[0] - gaps[-1]) <= 1
+
+
+@pytest.mark.parametrize("overrides", ["", "{mpc: {preset: ijrr_2013}, clutter: {num_fixed: 3}}"])
+def test_a_request_comes_back_from_its_file(tmp_path: Path, overrides: str) -> None:
+    scenario = load_scenario("cylinder-clutter", overrides)
+    request = make_request(scenario=scenario, stream="holdout", max_starts=None)
+    write_request(request, tmp_path / "request.yaml")
+    assert read_request(tmp_path / "request.yaml") == request
+
+
+def _edited(path: Path, **values: object) -> Path:
+    write_request(make_request(), path)
+    data = yaml.safe_load(path.read_text())
+    path.write_text(yaml.safe_dump({**data, **values}))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("values", "error", "message"),
+    [
+        ({"environments": "many"}, LibraryError, "is not a collection request"),
+        ({"environments": True}, LibraryError, "is not a collection request"),
+        ({"surprise": 1}, LibraryError, "is not a collection request"),
+        ({"scenario": "cylinder-clutter"}, LibraryError, "is not a collection request"),
+        ({"scenario_digest": "0" * 12}, LibraryError, "edited or another lic_drake wrote it"),
+        ({"environments": 10**12}, RequestError, "environments must be from 1 to"),
+        ({"stream": "tuning"}, RequestError, "unknown stream 'tuning'; choose one of"),
+    ],
+)
+def test_an_edited_request_file_is_refused(
+    tmp_path: Path, values: dict[str, object], error: type[Exception], message: str
+) -> None:
+    with pytest.raises(error, match=message):
+        read_request(_edited(tmp_path / "request.yaml", **values))
+
+
+def test_a_request_file_cannot_run_code(tmp_path: Path) -> None:
+    path = tmp_path / "request.yaml"
+    path.write_text(f"!!python/object/apply:os.mkdir [{tmp_path / 'made'}]")
+    with pytest.raises(LibraryError, match="is not a collection request"):
+        read_request(path)
+    assert not (tmp_path / "made").exists()
+
+
+@pytest.mark.parametrize("content", [b"", b"\xff\xfe\x00", b"{", b"- 1"])
+def test_a_file_that_is_no_request_is_named(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "request.yaml"
+    path.write_bytes(content)
+    with pytest.raises(LibraryError, match=r"request\.yaml is not a collection request"):
+        read_request(path)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"environments": 0}, "environments must be from 1 to 1000000, got 0"),
+        ({"first_environment": -1}, "must be from 0 to .*, got -1"),
+        ({"first_environment": 2**32}, "must be from 0 to .*, got 4294967296"),
+        ({"max_goals": 0}, "max_goals must be 1 or more, got 0"),
+        ({"max_starts": -3}, "max_starts must be 1 or more, got -3"),
+    ],
+)
+def test_values_out_of_range_are_refused(values: dict[str, int], message: str) -> None:
+    with pytest.raises(RequestError, match=message):
+        make_request(**values)
+
+
+def test_a_start_line_out_of_reach_is_refused() -> None:
+    scenario = load_scenario("cylinder-clutter", "{task: {start_line: {x_m: 3.0}}}")
+    with pytest.raises(RequestError, match="planar-arm can take no pose of the start line"):
+        make_request(scenario=scenario).starts()
+
+
+def test_a_library_goes_on_with_the_same_or_more_environments_only(tmp_path: Path) -> None:
+    stored = make_request()
+    stored.refuse_unless_continuing(stored, tmp_path)
+    replace(stored, environments=4).refuse_unless_continuing(stored, tmp_path)
+    other = load_scenario("cylinder-clutter", "{stop: {timeout_s: 20}}")
+    for change, message in (
+        ({"environments": 2}, "3 environments, not 2"),
+        ({"stream": "holdout"}, "stream training instead of holdout"),
+        ({"max_goals": None}, "max_goals 4 instead of None"),
+        ({"scenario": other}, f"scenario_digest {SCENARIO.digest} instead of {other.digest}"),
+    ):
+        with pytest.raises(LibraryError, match=message):
+            replace(stored, **change).refuse_unless_continuing(stored, tmp_path)

@@ -1,0 +1,179 @@
+import dataclasses
+import struct
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from fake_reach import make_record, make_request
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from lic_drake.errors import LibraryError
+from lic_drake.experience.schema import (
+    FIELDS,
+    SCHEMA,
+    make_header,
+    read_header,
+    read_table,
+    to_records,
+    to_table,
+    write_table,
+)
+from lic_drake.reach.request import ReachRecord
+from lic_drake.reach.scenario import load_scenario, parse_scenario
+
+REQUEST = make_request()
+HEADER = make_header(REQUEST.scenario)
+RECORDS = [make_record(item) for item in REQUEST.reaches(0)]
+
+# Every bit pattern: zeros of both signs, infinities, and NaNs that carry a payload.
+any_float = st.integers(0, 2**64 - 1).map(
+    lambda bits: struct.unpack("<d", struct.pack("<Q", bits))[0]
+)
+awkward_float = st.sampled_from([0.0, -0.0, float("inf"), float("nan"), 5e-324, 0.1])
+VALUES = {
+    str: st.text(st.characters(codec="utf-8"), max_size=8),
+    int: st.integers(-(2**63), 2**63 - 1),
+    float: any_float | awkward_float,
+    bool: st.booleans(),
+    tuple[float, ...]: st.lists(any_float | awkward_float, max_size=8).map(tuple),
+}
+any_record = st.fixed_dictionaries({name: VALUES[kind] for name, kind in FIELDS.items()}).map(
+    lambda values: ReachRecord(**values)
+)
+
+
+def _bits(record: ReachRecord) -> list[object]:
+    """The values with every float as its bytes."""
+
+    def bits(value: object) -> object:
+        if isinstance(value, float):
+            return struct.pack("<d", value)
+        if isinstance(value, tuple):
+            return tuple(map(bits, value))
+        return type(value), value
+
+    return [bits(getattr(record, name)) for name in FIELDS]
+
+
+@pytest.fixture
+def shard(tmp_path: Path) -> Path:
+    path = tmp_path / "shard.parquet"
+    write_table(to_table(RECORDS, HEADER), path)
+    return path
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=50)
+@given(st.lists(any_record, max_size=5))
+def test_records_come_back_from_the_file_bit_by_bit(
+    tmp_path: Path, records: list[ReachRecord]
+) -> None:
+    path = tmp_path / "any.parquet"
+    write_table(to_table(records, HEADER), path)
+    assert list(map(_bits, to_records(read_table(path)))) == list(map(_bits, records))
+
+
+def test_the_columns_are_the_records_fields_with_their_units(shard: Path) -> None:
+    schema = pq.read_schema(shard)
+    assert schema.names == [item.name for item in dataclasses.fields(ReachRecord)]
+    assert schema.field("peak_force").metadata[b"unit"] == b"N"
+    assert schema.field("start_phi").metadata[b"unit"] == b"rad"
+    assert all(schema.field(name).metadata[b"doc"] for name in schema.names)
+    assert schema.field("q_final").type.value_type == pa.float64()
+
+
+@pytest.mark.parametrize(
+    "overrides", ["", "{mpc: {preset: ijrr_2013}}", "{task: {goal_area: {step_m: 0.3}}}"]
+)
+def test_a_file_carries_the_whole_scenario(tmp_path: Path, overrides: str) -> None:
+    scenario = load_scenario("cylinder-clutter", overrides)
+    path = tmp_path / "shard.parquet"
+    write_table(to_table([], make_header(scenario)), path)
+    header = read_header(path)
+    assert parse_scenario(header.scenario) == scenario
+    assert parse_scenario(header.scenario).digest == header.scenario_digest == scenario.digest
+
+
+def test_a_cut_file_is_an_error_wherever_it_is_cut(shard: Path) -> None:
+    content = shard.read_bytes()
+    for length in range(0, len(content), 97):
+        shard.write_bytes(content[:length])
+        with pytest.raises(LibraryError, match=r"shard\.parquet is damaged .* delete it"):
+            read_table(shard)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=200)
+@given(st.data())
+def test_a_flipped_byte_is_no_other_kind_of_error(shard: Path, data: st.DataObject) -> None:
+    content = bytearray(shard.read_bytes())
+    position = data.draw(st.integers(0, len(content) - 1))
+    content[position] = data.draw(st.integers(0, 255))
+    damaged = shard.with_name("damaged.parquet")
+    damaged.write_bytes(content)
+    with suppress(LibraryError):
+        assert len(to_records(read_table(damaged))) == len(RECORDS)
+
+
+def test_a_flipped_byte_in_the_data_of_any_column_is_found(shard: Path) -> None:
+    content = shard.read_bytes()
+    chunks = pq.read_metadata(shard).row_group(0)
+    for i in range(chunks.num_columns):
+        chunk = chunks.column(i)
+        begin = chunk.dictionary_page_offset or chunk.data_page_offset
+        damaged = bytearray(content)
+        damaged[begin + chunk.total_compressed_size - 1] ^= 0xFF
+        shard.write_bytes(damaged)
+        with pytest.raises(LibraryError, match="is damaged"):
+            read_table(shard)
+
+
+def _foreign(table: pa.Table) -> pa.Table:
+    return table.replace_schema_metadata({"pandas": "{}", b"\xff": b"\xfe"})
+
+
+def _newer(table: pa.Table) -> pa.Table:
+    metadata = {**table.schema.metadata, b"lic_drake.schema_version": b"99"}
+    return table.replace_schema_metadata(metadata)
+
+
+def _narrower(table: pa.Table) -> pa.Table:
+    return table.drop_columns(["peak_force"])
+
+
+def _retyped(table: pa.Table) -> pa.Table:
+    index = table.schema.get_field_index("environment")
+    return table.set_column(index, "environment", table.column("environment").cast(pa.float64()))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (_foreign, "is not part of an experience library"),
+        (_newer, "has schema version 99, written by lic_drake 0.1.0; .* reads version 1"),
+        (_narrower, r"has other columns than this lic_drake writes \(peak_force\)"),
+        (_retyped, r"has other columns than this lic_drake writes \(environment\)"),
+    ],
+)
+def test_another_kind_of_table_is_refused_by_name(
+    shard: Path, change: Callable[[pa.Table], pa.Table], message: str
+) -> None:
+    pq.write_table(change(pq.read_table(shard)), shard)
+    with pytest.raises(LibraryError, match=message) as caught:
+        read_table(shard)
+    assert str(shard) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(LibraryError, match=r"cannot read .*none\.parquet: No such file"):
+        read_table(tmp_path / "none.parquet")
+
+
+def test_the_schema_keeps_its_version() -> None:
+    # A change here means that older libraries cannot be read: raise SCHEMA_VERSION with it.
+    columns = ",".join(f"{item.name}:{item.type}" for item in SCHEMA)
+    assert columns.count(",") == 30
+    assert columns.startswith("key:string,category:string,robot:string,scenario:string,stream")

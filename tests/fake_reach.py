@@ -1,0 +1,135 @@
+"""Reaches without a simulator: records made from the request alone, and faults on demand."""
+
+import hashlib
+import math
+import os
+import resource
+import signal
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from lic_drake.experience.grid import CollectionRequest
+from lic_drake.reach.request import ReachRecord, ReachRequest
+from lic_drake.reach.scenario import load_scenario
+
+
+def make_request(**values: object) -> CollectionRequest:
+    """A small collection: 3 environments x 4 goals x 3 starts unless told otherwise."""
+    scenario = load_scenario("cylinder-clutter")
+    defaults = {"scenario": scenario, "environments": 3, "max_goals": 4, "max_starts": 3}
+    return CollectionRequest(**{**defaults, **values})
+
+
+def make_record(request: ReachRequest) -> ReachRecord:
+    """A record whose numbers are drawn from the request's key; one in eight never began."""
+    digest = hashlib.sha256(request.key.encode()).digest()
+    began = digest[0] % 8 != 0
+    success = began and digest[0] % 2 == 1
+    numbers = [int.from_bytes(digest[i : i + 4]) / 2**32 if began else math.nan for i in range(12)]
+    return ReachRecord(
+        key=request.key,
+        category=request.scenario.category,
+        robot=request.scenario.robot,
+        scenario=request.scenario.digest,
+        stream=request.stream,
+        environment=request.environment,
+        goal_x=request.goal[0],
+        goal_y=request.goal[1],
+        goal_z=request.goal[2],
+        start_x=request.start[0],
+        start_y=request.start[1],
+        start_phi=request.start[2],
+        outcome="reached" if success else "stuck" if began else "invalid_start",
+        success=success,
+        final_x=numbers[0],
+        final_y=numbers[1],
+        final_phi=numbers[2],
+        final_vx=numbers[3],
+        final_vy=numbers[4],
+        min_distance=numbers[5],
+        peak_force=numbers[6],
+        mean_force=numbers[7],
+        peak_contacts=digest[1] if began else 0,
+        mean_contacts=numbers[8],
+        duration_s=30.0 * numbers[9] if began else 0.0,
+        wall_time_s=time.perf_counter(),
+        q_start=tuple(numbers[:3]) if began else (),
+        q_final=tuple(numbers[3:6]) if began else (),
+        detail="" if began else 'the arm touches "success": true\r\n at its start',
+        lic_drake_version="0.1.0",
+        drake_version="1.58.0",
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class FakeReach:
+    """A reach function that notes each call and can fail in the ways of the real world.
+
+    Attributes:
+        log: File that gets a line "key pid" for each finished call.
+        sleep_s: Duration of a call, seconds.
+        deadly: Key of the request that kills its process by SIGKILL ...
+        deaths: ... this many times.
+        failing_environment: Environment whose reaches raise.
+        max_file_bytes: Kernel limit for every file the process writes; 0: none.
+    """
+
+    log: Path
+    sleep_s: float = 0.0
+    deadly: str = ""
+    deaths: int = 1
+    failing_environment: int = -1
+    max_file_bytes: int = 0
+
+    def __call__(self, request: ReachRequest) -> ReachRecord:
+        if request.environment == self.failing_environment:
+            raise ArithmeticError("no such\nenvironment")
+        if self.max_file_bytes:
+            hard = resource.getrlimit(resource.RLIMIT_FSIZE)[1]
+            resource.setrlimit(resource.RLIMIT_FSIZE, (self.max_file_bytes, hard))
+        time.sleep(self.sleep_s)
+        deaths = self.log.with_suffix(".deaths")
+        if request.key == self.deadly:
+            already = deaths.stat().st_size if deaths.exists() else 0
+            if already < self.deaths:
+                _append(deaths, "x")
+                os.kill(os.getpid(), signal.SIGKILL)
+        _append(self.log, f"{request.key} {os.getpid()}\n")
+        return make_record(request)
+
+    def calls(self) -> list[str]:
+        """Keys of the finished calls."""
+        return [line.split()[0] for line in self._lines()]
+
+    def processes(self) -> set[int]:
+        """Ids of the processes that finished calls."""
+        return {int(line.split()[1]) for line in self._lines()}
+
+    def _lines(self) -> list[str]:
+        return self.log.read_text().splitlines() if self.log.exists() else []
+
+
+def comparable(records: list[ReachRecord]) -> list[str]:
+    """Records as text without what differs between runs; NaN equals NaN."""
+    return [
+        repr({name: value for name, value in vars(record).items() if name != "wall_time_s"})
+        for record in records
+    ]
+
+
+def expected_records(request: CollectionRequest) -> list[str]:
+    """What a complete library of a request holds, as `comparable` text."""
+    return comparable(
+        [
+            make_record(item)
+            for environment in request.environment_indices
+            for item in request.reaches(environment)
+        ]
+    )
+
+
+def _append(path: Path, text: str) -> None:
+    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+    os.write(descriptor, text.encode())
+    os.close(descriptor)

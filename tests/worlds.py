@@ -1,0 +1,135 @@
+"""Small worlds for tests: hand-made clutter, and arm and clutter without sensor or controller."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.multibody.math import SpatialForce
+from pydrake.multibody.plant import ExternallyAppliedSpatialForce
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.robots.planar import planar_arm
+from lic_drake.scene.scene import Scene, SceneConfig, add_scene
+
+ARM = planar_arm()
+
+
+def make_clutter(*objects: ClutterInstance) -> ClutterInstance:
+    """Puts objects of `cylinder` and `box` together."""
+    return ClutterInstance(
+        category="test",
+        shape=tuple(name for item in objects for name in item.shape),
+        size=np.vstack([np.zeros((0, 3)), *(item.size for item in objects)]),
+        p_WO=np.vstack([np.zeros((0, 3)), *(item.p_WO for item in objects)]),
+        yaw=np.concatenate([np.zeros(0), *(item.yaw for item in objects)]),
+        mass=np.concatenate([np.zeros(0), *(item.mass for item in objects)]),
+        movable=np.concatenate([np.zeros(0, bool), *(item.movable for item in objects)]),
+    )
+
+
+def cylinder(
+    x: float, y: float, *, movable: bool = False, radius: float = 0.01, mass: float = 1.0
+) -> ClutterInstance:
+    """One upright cylinder of 0.2 m length."""
+    return _one("cylinder", (radius, 0.2, 0.0), x, y, 0.0, mass, movable)
+
+
+def box(
+    x: float, y: float, edges: tuple[float, float, float], yaw: float = 0.0, movable: bool = False
+) -> ClutterInstance:
+    """One box of 1 kg."""
+    return _one("box", edges, x, y, yaw, 1.0, movable)
+
+
+def _one(
+    shape: str,
+    size: tuple[float, float, float],
+    x: float,
+    y: float,
+    yaw: float,
+    mass: float,
+    movable: bool,
+) -> ClutterInstance:
+    return ClutterInstance(
+        category="test",
+        shape=(shape,),
+        size=np.array([size]),
+        p_WO=np.array([[x, y, 0.0]]),
+        yaw=np.array([yaw]),
+        mass=np.array([mass]),
+        movable=np.array([movable]),
+    )
+
+
+@dataclass(kw_only=True)
+class World:
+    """Arm and clutter with fixed equilibrium angles, and a context of the whole."""
+
+    diagram: Diagram
+    context: Context
+    scene: Scene
+    simulator: Simulator
+
+    @property
+    def plant_context(self) -> Context:
+        return self.scene.plant.GetMyContextFromRoot(self.context)
+
+    @property
+    def q(self) -> np.ndarray:
+        return self.scene.plant.GetPositions(self.plant_context, self.scene.arm)
+
+    @property
+    def objects(self) -> np.ndarray:
+        """Positions of the movable objects, shape (n, 2)."""
+        return self.scene.plant.GetPositions(self.plant_context, self.scene.clutter).reshape(-1, 2)
+
+    @property
+    def object_velocities(self) -> np.ndarray:
+        plant = self.scene.plant
+        return plant.GetVelocities(self.plant_context, self.scene.clutter).reshape(-1, 2)
+
+    def set_equilibrium(self, q_d: np.ndarray) -> None:
+        plant = self.scene.plant
+        plant.get_desired_state_input_port(self.scene.arm).FixValue(
+            self.plant_context, np.append(q_d, np.zeros(3))
+        )
+
+    def push(self, body: str, p_BoQ_B: np.ndarray, f_Q_W: np.ndarray) -> None:
+        """Applies a constant force to a point of a body, and no other force."""
+        force = ExternallyAppliedSpatialForce()
+        force.body_index = self.scene.plant.GetBodyByName(body).index()
+        force.p_BoBq_B = np.asarray(p_BoQ_B, dtype=float)
+        force.F_Bq_W = SpatialForce(np.zeros(3), np.asarray(f_Q_W, dtype=float))
+        self.scene.plant.get_applied_spatial_force_input_port().FixValue(
+            self.plant_context, [force]
+        )
+
+    def advance(self, duration_s: float) -> None:
+        self.simulator.AdvanceTo(self.context.get_time() + duration_s)
+
+
+def make_world(
+    q: np.ndarray,
+    clutter: ClutterInstance,
+    config: SceneConfig,
+    extend: Callable[[DiagramBuilder, Scene], None] = lambda builder, scene: None,
+) -> World:
+    """Builds a world at rest with the equilibrium angles q; `extend` may add systems."""
+    builder = DiagramBuilder()
+    scene = add_scene(builder, ARM, clutter, config)
+    extend(builder, scene)
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    plant = scene.plant
+    plant_context = plant.GetMyMutableContextFromRoot(context)
+    plant.SetPositions(plant_context, scene.arm, q)
+    plant.get_desired_state_input_port(scene.clutter).FixValue(
+        plant_context, np.zeros(plant.num_multibody_states(scene.clutter))
+    )
+    world = World(
+        diagram=diagram, context=context, scene=scene, simulator=Simulator(diagram, context)
+    )
+    world.set_equilibrium(q)
+    return world
