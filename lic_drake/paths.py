@@ -19,6 +19,6 @@ def scenarios_dir() -> Path:
     return models_dir() / "scenarios"
 
 
-def experience_dir() -> Path:
-    """Returns the folder with the shipped experience libraries."""
-    return models_dir() / "experience"
+def shipped_library(category: str) -> Path:
+    """Returns the folder of the experience library shipped for a clutter category."""
+    return models_dir() / "experience" / category

@@ -17,6 +17,17 @@ def positive_int(text: str) -> int:
     return value
 
 
+def non_negative_int(text: str) -> int:
+    """Reads a whole number of 0 or more; for `type=` of an argument."""
+    try:
+        value = int(text)
+    except ValueError:
+        value = -1
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"needs a whole number of 0 or more, got {text!r}")
+    return value
+
+
 def add_scenario_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds --scenario and --set."""
     parser.add_argument(

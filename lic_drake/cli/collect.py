@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from lic_drake.cli import exit_codes
 from lic_drake.cli.arguments import Subparsers, positive_int
 
 if TYPE_CHECKING:
@@ -19,9 +20,6 @@ if TYPE_CHECKING:
     from lic_drake.experience.progress import Progress
 
 DEFAULT_SCENARIO = "cylinder-clutter"
-
-EXIT_INCOMPLETE = 1
-EXIT_INTERRUPTED = 130
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -63,7 +61,7 @@ def add_parser(subparsers: Subparsers) -> None:
         metavar="N",
         type=positive_int,
         default=os.cpu_count() or 1,
-        help="number of worker processes, 150 MB of memory each (default: CPU count, %(default)s)",
+        help="number of worker processes, 200 MB of memory each (default: CPU count, %(default)s)",
     )
     parser.add_argument(
         "--max-goals",
@@ -113,7 +111,7 @@ def run(args: argparse.Namespace) -> int:
             f" lic collect {shlex.quote(str(args.library))}",
             file=sys.stderr,
         )
-        return EXIT_INTERRUPTED
+        return exit_codes.INTERRUPTED
     return _conclude(report)
 
 
@@ -165,5 +163,5 @@ def _conclude(report: "CollectionReport") -> int:
         print(f"lic: environment {failed.environment} failed: {failed.reason}", file=sys.stderr)
     if progress.done < progress.total:
         print("lic: the library is incomplete; run the same command to try again", file=sys.stderr)
-        return EXIT_INCOMPLETE
+        return exit_codes.INCOMPLETE
     return 0

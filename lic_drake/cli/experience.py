@@ -7,12 +7,11 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from lic_drake.cli import exit_codes
 from lic_drake.cli.arguments import Subparsers
 
 if TYPE_CHECKING:
     from lic_drake.experience.summary import LibrarySummary
-
-EXIT_UNSOUND = 1
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -112,7 +111,7 @@ def run_check(args: argparse.Namespace) -> int:
     report = check_library(ExperienceLibrary(args.library), request)
     if args.json:
         print(json.dumps({**dataclasses.asdict(report), "is_sound": report.is_sound}, indent=2))
-        return 0 if report.is_sound else EXIT_UNSOUND
+        return 0 if report.is_sound else exit_codes.INCOMPLETE
     missing = "unknown (no request)" if report.missing is None else report.missing
     print(f"shards      {report.shards}")
     print(f"reaches     {report.reaches}, and {report.journalled} in journals")
@@ -123,7 +122,7 @@ def run_check(args: argparse.Namespace) -> int:
     print(f"duplicates  {len(report.duplicates)} {' '.join(report.duplicates[:5])}".rstrip())
     print(f"missing     {missing}")
     print("sound" if report.is_sound else "NOT SOUND")
-    return 0 if report.is_sound else EXIT_UNSOUND
+    return 0 if report.is_sound else exit_codes.INCOMPLETE
 
 
 def run_merge(args: argparse.Namespace) -> int:

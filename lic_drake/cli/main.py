@@ -6,15 +6,11 @@ import sys
 from collections.abc import Sequence
 
 import lic_drake
-from lic_drake.cli import collect, experience, reach
+from lic_drake.cli import bench, collect, demo, evaluate, exit_codes, experience, reach, select
 from lic_drake.errors import LicError
 
-SUBCOMMANDS = (reach, collect, experience)
+SUBCOMMANDS = (demo, reach, select, collect, experience, evaluate, bench)
 """Modules with `add_parser(subparsers)`, which sets `run(args) -> int` as a parser default."""
-
-EXIT_USER_ERROR = 2
-EXIT_INTERRUPTED = 130
-EXIT_BROKEN_PIPE = 141
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -30,14 +26,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         return code
     except LicError as error:
         print(f"lic: error: {' '.join(str(error).split())}", file=sys.stderr)
-        return EXIT_USER_ERROR
+        return exit_codes.USER_ERROR
     except KeyboardInterrupt:
         print("lic: interrupted", file=sys.stderr)
-        return EXIT_INTERRUPTED
+        return exit_codes.INTERRUPTED
     except BrokenPipeError:
         # The reader has gone (`lic ... | head`); Python must not complain when it flushes at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return EXIT_BROKEN_PIPE
+        return exit_codes.BROKEN_PIPE
 
 
 def _make_parser() -> argparse.ArgumentParser:

@@ -2,7 +2,7 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.systems.framework import Context, DiscreteStateIndex, DiscreteValues, LeafSystem
+from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from lic_drake.control.mpc import HapticMpc, MpcInput
 from lic_drake.control.mpc_config import MpcConfig
@@ -30,8 +30,9 @@ class HapticMpcController(LeafSystem):
         self._arm_state = self.DeclareVectorInputPort("arm_state", 2 * self._num_joints)
         self._taxel_force = self.DeclareVectorInputPort("taxel_force", layout.num_taxels)
         self._goal = self.DeclareVectorInputPort("goal", 3)
-        self._desired: DiscreteStateIndex = self.DeclareDiscreteState(2 * self._num_joints)
-        self.DeclareStateOutputPort("desired_state", self._desired)
+        desired = self.DeclareDiscreteState(2 * self._num_joints)
+        self._desired = int(desired)
+        self.DeclareStateOutputPort("desired_state", desired)
         self.DeclarePeriodicDiscreteUpdateEvent(config.period_s, 0.0, self._update)
 
     def set_equilibrium(self, context: Context, q_d: NDArray[np.float64]) -> None:

@@ -45,9 +45,7 @@ class TactileSensor(LeafSystem):
             output.SetFromVector(np.zeros(self._layout.num_taxels))
             return
         q = np.asarray(self._arm_state.Eval(context))[: len(self._arm.q_min)]
-        output.SetFromVector(
-            calc_taxel_forces(self._layout, *self._arm.link_poses(q), patches)
-        )
+        output.SetFromVector(calc_taxel_forces(self._layout, *self._arm.link_poses(q), patches))
 
 
 def read_patches(

@@ -20,7 +20,7 @@ class ExperienceRows:
     Attributes:
         Z: Features, shape (n, d).
         f: Successes, shape (n,), each 0 or 1.
-        environment: Index of each reach's environment, shape (n,).
+        environment: Number that stands for each reach's environment, shape (n,).
     """
 
     Z: Vector
@@ -75,16 +75,19 @@ class FeatureMap:
         Raises:
             EstimateError: A column is missing.
         """
-        needed = (*self.names, "success", "environment")
+        needed = (*self.names, "success", "stream", "environment")
         missing = [name for name in needed if name not in columns]
         if missing:
             raise EstimateError(
                 f"the library has no column {missing[0]!r}; it needs {', '.join(needed)}"
             )
+        # Environments of different streams share indices.
+        streams, stream = np.unique(columns["stream"].astype(str), return_inverse=True)
+        environment = columns["environment"].astype(np.int64) * len(streams) + stream
         return ExperienceRows(
             Z=np.column_stack([np.asarray(columns[name], dtype=float) for name in self.names]),
             f=np.asarray(columns["success"], dtype=float),
-            environment=np.asarray(columns["environment"], dtype=np.int64),
+            environment=environment,
         )
 
     def join(self, p_WG: ArrayLike, x0: ArrayLike) -> Vector:
@@ -94,9 +97,7 @@ class FeatureMap:
             p_WG: Goal, shape (..., 3), metres.
             x0: Initial condition (x, y, phi), shape (..., 3), metres and radians.
         """
-        p_WG, x0 = np.broadcast_arrays(
-            np.asarray(p_WG, dtype=float), np.asarray(x0, dtype=float)
-        )
+        p_WG, x0 = np.broadcast_arrays(np.asarray(p_WG, dtype=float), np.asarray(x0, dtype=float))
         goal = p_WG[..., [_GOAL.index(name) for name in self.goal]]
         return np.concatenate([goal, x0[..., self._start_indices()]], axis=-1)
 

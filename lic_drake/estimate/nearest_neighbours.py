@@ -4,10 +4,11 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from lic_drake.estimate.averaging import average_rows
+from lic_drake.estimate.bandwidth import gaussian_weights, query_neighbours, select_bandwidth
 from lic_drake.estimate.checks import (
     EstimateError,
     Vector,
@@ -17,13 +18,6 @@ from lic_drake.estimate.checks import (
 )
 from lic_drake.estimate.estimator import Prediction
 from lic_drake.estimate.folds import selection_folds
-from lic_drake.seeds import make_generator
-
-_MAX_SELECTION_POINTS = 2000
-_NUM_BANDWIDTHS = 16
-# A neighbour at this many bandwidths weighs 1/23 of one at hand: where the set of neighbours
-# changes, the estimate then jumps by little.
-_TRUNCATION = 2.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,7 +89,7 @@ class NearestNeighbours:
         if self._given is None:
             fold = selection_folds(environment, len(f))
             _, point = tree.query(Z / scale)
-            self._chosen = _select_bandwidth(tree, self.neighbours, point, f, fold)
+            self._chosen = select_bandwidth(tree, self.neighbours, point, f, fold)
         self._points = _Points(
             tree=tree, points=points, rate=rows.rate, count=rows.count, scale=scale
         )
@@ -105,8 +99,8 @@ class NearestNeighbours:
         """Estimates P(success) for queries Z, shape (n, d); see `Predictor`."""
         at = self._fitted()
         queries = checked_queries(Z, len(at.scale)) / at.scale
-        distance, index = _query(at.tree, queries, self.neighbours)
-        weight = _weights(distance, self.bandwidth)
+        distance, index = query_neighbours(at.tree, queries, self.neighbours)
+        weight = gaussian_weights(distance, self.bandwidth)
         weighted_count = weight * at.count[index]
         total = weighted_count.sum(axis=1)
         probability = np.sum(weighted_count * at.rate[index], axis=1) / total
@@ -125,8 +119,8 @@ class NearestNeighbours:
         """
         at = self._fitted()
         query = checked_queries(np.atleast_2d(z), len(at.scale))[0] / at.scale
-        distance, index = _query(at.tree, query, self.neighbours)
-        weight = _weights(distance, self.bandwidth) * at.count[index]
+        distance, index = query_neighbours(at.tree, query, self.neighbours)
+        weight = gaussian_weights(distance, self.bandwidth) * at.count[index]
         weight /= weight.sum()
         rate = at.rate[index]
         value = weight @ rate
@@ -137,56 +131,3 @@ class NearestNeighbours:
         if self._points is None:
             raise EstimateError("the nearest neighbours have no rows yet; call fit(Z, f) first")
         return self._points
-
-
-def _query(
-    tree: cKDTree, queries: Vector, neighbours: int
-) -> tuple[Vector, NDArray[np.intp]]:
-    """Returns distances and indices of the nearest points, shape (..., k), nearest first."""
-    k = min(neighbours, tree.n)
-    distance, index = tree.query(queries, k=k)
-    # For a single neighbour the tree leaves out their axis.
-    return (distance[..., None], index[..., None]) if k == 1 else (distance, index)
-
-
-def _weights(distance: Vector, bandwidth: float) -> Vector:
-    """Returns weights relative to the nearest neighbour's, so that they never all underflow."""
-    nearest = distance[..., :1]
-    weights: Vector = np.exp(-0.5 * (distance**2 - nearest**2) / bandwidth**2)
-    return weights
-
-
-def _select_bandwidth(
-    tree: cKDTree, neighbours: int, point: NDArray[np.intp], f: Vector, fold: NDArray[np.intp]
-) -> float:
-    """Returns the bandwidth with the least squared error in folds that were held out.
-
-    Args:
-        tree: The distinct points.
-        neighbours: Number of points averaged.
-        point: Point of each reach, shape (n,).
-        f: Success of each reach, shape (n,).
-        fold: Fold of each reach, shape (n,).
-    """
-    if tree.n == 1:
-        return 1.0
-    shape = (tree.n, int(fold.max()) + 1)
-    cell = np.ravel_multi_index((point, fold), shape)
-    size = shape[0] * shape[1]
-    tries = np.bincount(cell, minlength=size).reshape(shape).astype(float)
-    successes = np.bincount(cell, weights=f, minlength=size).reshape(shape)
-    # What each fold is predicted from: everything but itself.
-    seen_tries = tries.sum(axis=1, keepdims=True) - tries
-    seen_successes = successes.sum(axis=1, keepdims=True) - successes
-
-    rng = make_generator("training", "points for the choice of a bandwidth")
-    tried = rng.permutation(tree.n)[:_MAX_SELECTION_POINTS]
-    distance, index = _query(tree, tree.data[tried], neighbours)
-    smallest = 0.5 * np.median(distance[:, 1])
-    largest = max(smallest, np.median(distance[:, -1]) / _TRUNCATION)
-
-    def error(bandwidth: float) -> float:
-        weight = csr_array(...)
-        return 0.0
-
-    return float(min(np.geomspace(smallest, largest, _NUM_BANDWIDTHS), key=error))

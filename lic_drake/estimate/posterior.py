@@ -41,9 +41,7 @@ class Posterior:
         covariance = self._covariance(Z)
         explained = solve_triangular(self.lower, covariance, lower=True, check_finite=False)
         mean_part = (1.0 - self.ones_weight @ covariance) ** 2 / self.ones_weight.sum()
-        variance = (
-            self.hyperparameters.signal_variance - np.sum(explained**2, axis=0) + mean_part
-        )
+        variance = self.hyperparameters.signal_variance - np.sum(explained**2, axis=0) + mean_part
         return np.sqrt(np.maximum(variance, 0.0))
 
     def mean_and_gradient(self, z: Vector) -> tuple[float, Vector]:

@@ -24,7 +24,7 @@ from lic_drake.experience.progress import Progress, ProgressFunction
 from lic_drake.experience.schema import read_table
 from lic_drake.experience.slots import Slot, TaskState
 from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.experience.task import ReachFunction, Task, TaskReport, simulate
+from lic_drake.experience.task import ReachFunction, Task, simulate
 from lic_drake.experience.workers import make_process_pool
 
 POLL_S = 0.5
@@ -100,8 +100,9 @@ def collect(
                 for slot in slots:
                     if collection.waiting and slot.state is None:
                         slot.start(collection.waiting.popleft())
-                for state, result in Slot.wait(slots, POLL_S):
-                    collection.take(state, result)
+                for state, error in Slot.wait(slots, POLL_S):
+                    if error is not None:
+                        collection.handle(state, error)
                 if progress is not None:
                     progress(collection.progress())
         finally:
@@ -115,7 +116,12 @@ def collect(
 
 
 class _Collection:
-    """The tasks of a collection and what became of them."""
+    """The tasks of a collection and what became of them.
+
+    Attributes:
+        waiting: Tasks that no slot has begun.
+        failed: Tasks that were given up.
+    """
 
     def __init__(
         self, library: ExperienceLibrary, request: CollectionRequest, reach: ReachFunction
@@ -145,27 +151,23 @@ class _Collection:
         self.waiting = deque(self._states)
         self.failed: list[FailedTask] = []
 
-    def take(self, state: TaskState, result: TaskReport | Exception) -> None:
-        """Takes the result of a task.
+    def handle(self, state: TaskState, error: Exception) -> None:
+        """Decides what becomes of a task that ended with an error.
 
         Raises:
             LibraryError: The task could not write; the others could not either.
         """
-        match result:
-            case TaskReport():
-                pass
-            case LibraryError():
-                raise LibraryError(
-                    f"{result}; finished reaches are kept, run the same command to go on"
-                )
-            case BrokenExecutor():
-                state.breaks += 1
-                if state.breaks < MAX_BREAKS:
-                    self.waiting.append(state)
-                else:
-                    self._fail(state, f"its worker process died {MAX_BREAKS} times")
-            case _:
-                self._fail(state, " ".join(f"{type(result).__name__}: {result}".split()))
+        if isinstance(error, LibraryError):
+            raise LibraryError(f"{error}; finished reaches are kept, run the same command to go on")
+        if isinstance(error, BrokenExecutor):
+            state.breaks += 1
+            if state.breaks < MAX_BREAKS:
+                self.waiting.append(state)
+                return
+            reason = f"its worker process died {MAX_BREAKS} times"
+        else:
+            reason = " ".join(f"{type(error).__name__}: {error}".split())
+        self.failed.append(FailedTask(environment=state.task.environment, reason=reason))
 
     def progress(self) -> Progress:
         """Returns the present state, as far as the journals were looked at."""
@@ -176,9 +178,6 @@ class _Collection:
             successes=self._stored_successes + sum(state.successes for state in self._states),
             elapsed_s=time.monotonic() - self._began,
         )
-
-    def _fail(self, state: TaskState, reason: str) -> None:
-        self.failed.append(FailedTask(environment=state.task.environment, reason=reason))
 
 
 def _record_request(library: ExperienceLibrary, request: CollectionRequest) -> None:

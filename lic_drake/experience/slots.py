@@ -8,6 +8,7 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future
 
 from lic_drake.experience.journal import JournalTail, journal_path
 from lic_drake.experience.task import Task, TaskReport, run_task
+from lic_drake.experience.workers import ctrl_c_held_back
 
 TASKS_PER_EXECUTOR = 20
 """A slot's executor is replaced after this many tasks, which bounds the memory of a worker.
@@ -56,16 +57,17 @@ class Slot:
         """Gives a task to an idle slot."""
         if self._tasks == TASKS_PER_EXECUTOR:
             self._renew()
-        try:
-            self._future = self._executor.submit(run_task, state.task)
-        except BrokenExecutor:  # The worker died while it was idle.
-            self._renew()
-            self._future = self._executor.submit(run_task, state.task)
+        with ctrl_c_held_back():
+            try:
+                self._future = self._executor.submit(run_task, state.task)
+            except BrokenExecutor:  # The worker died while it was idle.
+                self._renew()
+                self._future = self._executor.submit(run_task, state.task)
         self._tasks += 1
         self.state = state
 
-    def take(self) -> tuple[TaskState, TaskReport | Exception] | None:
-        """Returns an ended task with its report or what went wrong, and makes the slot idle."""
+    def take(self) -> tuple[TaskState, Exception | None] | None:
+        """Returns an ended task with what went wrong, if anything, and makes the slot idle."""
         if self.state is None:
             return None
         if not self._future.done():
@@ -80,7 +82,7 @@ class Slot:
                 self._renew()
             return state, error
         state.finished, state.successes = report.finished, report.successes
-        return state, report
+        return state, None
 
     def close(self) -> None:
         """Waits until the worker has stopped."""
@@ -96,7 +98,7 @@ class Slot:
     @staticmethod
     def wait(
         slots: Sequence["Slot"], timeout_s: float
-    ) -> Iterator[tuple[TaskState, TaskReport | Exception]]:
+    ) -> Iterator[tuple[TaskState, Exception | None]]:
         """Waits until a task ends or the time is over; yields the tasks that have ended."""
         busy = [slot._future for slot in slots if slot.state is not None]
         wait(busy, timeout=timeout_s, return_when=FIRST_COMPLETED)

@@ -3,7 +3,9 @@
 import os
 import signal
 import threading
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from multiprocessing import get_context, parent_process
 
 
@@ -12,6 +14,19 @@ def make_process_pool() -> ProcessPoolExecutor:
     return ProcessPoolExecutor(
         max_workers=1, mp_context=get_context("forkserver"), initializer=_prepare_worker
     )
+
+
+@contextmanager
+def ctrl_c_held_back() -> Iterator[None]:
+    """Keeps Ctrl-C from processes that start within; it takes effect here afterwards.
+
+    A worker would print a traceback if it were interrupted before `_prepare_worker` runs.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _prepare_worker() -> None:

@@ -35,9 +35,7 @@ class ReachDiagram:
         context = self.diagram.CreateDefaultContext()
         plant = self.scene.plant
         plant.SetPositions(plant.GetMyMutableContextFromRoot(context), self.scene.arm, q)
-        self.controller.set_equilibrium(
-            self.controller.GetMyMutableContextFromRoot(context), q
-        )
+        self.controller.set_equilibrium(self.controller.GetMyMutableContextFromRoot(context), q)
         self.diagram.GetInputPort("goal").FixValue(context, p_WG)
         return context
 
@@ -64,14 +62,11 @@ def make_reach_diagram(
     plant.set_name("plant")
 
     sensor = builder.AddNamedSystem("sensor", TactileSensor(arm, layout, scene.skin_links))
-    builder.Connect(
-        plant.get_contact_results_output_port(), sensor.GetInputPort("contact_results")
-    )
+    builder.Connect(plant.get_contact_results_output_port(), sensor.GetInputPort("contact_results"))
     builder.Connect(plant.get_state_output_port(scene.arm), sensor.GetInputPort("arm_state"))
 
-    controller = builder.AddNamedSystem(
-        "controller", HapticMpcController(arm, layout, scenario.mpc)
-    )
+    controller = HapticMpcController(arm, layout, scenario.mpc)
+    builder.AddNamedSystem("controller", controller)
     builder.Connect(plant.get_state_output_port(scene.arm), controller.GetInputPort("arm_state"))
     builder.Connect(sensor.GetOutputPort("taxel_force"), controller.GetInputPort("taxel_force"))
     builder.Connect(
@@ -84,9 +79,7 @@ def make_reach_diagram(
         "standstill",
         ConstantVectorSource(np.zeros(plant.num_multibody_states(scene.clutter))),
     )
-    builder.Connect(
-        standstill.get_output_port(), plant.get_desired_state_input_port(scene.clutter)
-    )
+    builder.Connect(standstill.get_output_port(), plant.get_desired_state_input_port(scene.clutter))
 
     builder.ExportOutput(plant.get_state_output_port(scene.arm), "arm_state")
     builder.ExportOutput(plant.get_state_output_port(scene.clutter), "clutter_state")
@@ -116,6 +109,4 @@ def make_reach_diagram(
         )
     diagram = builder.Build()
     diagram.set_name("reach")
-    return ReachDiagram(
-        diagram=diagram, scene=scene, controller=controller, visualizer=visualizer
-    )
+    return ReachDiagram(diagram=diagram, scene=scene, controller=controller, visualizer=visualizer)

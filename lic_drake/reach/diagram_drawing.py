@@ -15,8 +15,10 @@ _WIDTH, _ROW, _GAP = 4.2, 0.3, 2.2
 
 
 def list_connections(diagram: Diagram) -> list[Edge]:
-    """Returns the connections inside a diagram; exported ports connect to
-    two boxes of their own, "inputs" and "outputs"."""
+    """Returns the connections inside a diagram.
+
+    Exported ports connect to two boxes of their own, "inputs" and "outputs".
+    """
     edges = [
         (
             source[0].get_name(),
@@ -27,17 +29,13 @@ def list_connections(diagram: Diagram) -> list[Edge]:
         for sink, source in diagram.connection_map().items()
     ]
     for i in range(diagram.num_input_ports()):
-        for system, port in diagram.GetInputPortLocators(
-            diagram.get_input_port(i).get_index()
-        ):
+        for system, port in diagram.GetInputPortLocators(diagram.get_input_port(i).get_index()):
             name = system.get_input_port(port).get_name()
             edges.append(("inputs", diagram.get_input_port(i).get_name(), system.get_name(), name))
     for i in range(diagram.num_output_ports()):
         system, port = diagram.get_output_port_locator(diagram.get_output_port(i).get_index())
         name = system.get_output_port(port).get_name()
-        edges.append(
-            (system.get_name(), name, "outputs", diagram.get_output_port(i).get_name())
-        )
+        edges.append((system.get_name(), name, "outputs", diagram.get_output_port(i).get_name()))
     return sorted(edges)
 
 

@@ -1,6 +1,7 @@
 """Records reaches as one HTML file that plays offline, contact forces included."""
 
 import math
+import time
 from pathlib import Path
 
 import numpy as np
@@ -49,7 +50,7 @@ class ReachRecording:
         self._meshcat.StartRecording(frames_per_second, set_visualizations_while_recording=False)
         self._clock_s = 0.0
 
-    def add_reach(self, q0: Vector, p_WG: Vector) -> tuple[str, ReachTrace, str]:
+    def add_reach(self, q0: Vector, p_WG: Vector) -> tuple[str, ReachTrace, str, float]:
         """Simulates and records a reach in the environment as it was drawn.
 
         Args:
@@ -57,15 +58,16 @@ class ReachRecording:
             p_WG: Goal, shape (3,), metres.
 
         Returns:
-            Outcome, trace and remark as `lic_drake.reach.rollout.simulate`.
+            Outcome, trace and remark as `lic_drake.reach.rollout.simulate`; wall time, seconds.
         """
+        began = time.perf_counter()
         self._draw_goal(p_WG)
         outcome, trace, detail = simulate(
             self._diagram, self._scenario, q0, p_WG, begin_s=self._clock_s
         )
         if trace.time_s:
             self._clock_s += math.ceil(trace.time_s[-1] + PAUSE_S)
-        return outcome, trace, detail
+        return outcome, trace, detail, time.perf_counter() - began
 
     def save(self, path: Path) -> None:
         """Writes the recording.

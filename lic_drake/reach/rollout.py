@@ -115,7 +115,7 @@ def simulate(
             simulator.AdvanceTo(begin_s + step * scenario.mpc.period_s)
         except RuntimeError as error:
             return "diverged", trace, " ".join(str(error).split())[:200]
-        q = np.array(arm_state.Eval(context)[: len(q0)])
+        q = np.array(arm_state.Eval(context))[: len(q0)]
         if not np.all(np.isfinite(q)):
             return "diverged", trace, "joint angles are not finite"
         p_WE = arm.tip_position(q)

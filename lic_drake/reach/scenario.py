@@ -131,14 +131,14 @@ def _merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
     for key, value in over.items():
         old = merged.get(key)
         both = isinstance(old, dict) and isinstance(value, dict)
-        merged[key] = _merge(old, value) if both else value
+        merged[key] = _merge(merged[key], value) if both else value
     return merged
 
 
 def _typed(schema: type[Any], data: Any, source: str, defaults: Any = None) -> Any:
     """Reads one section with Drake's typed YAML reader, which refuses unknown keys."""
     try:
-        section = yaml_load_typed(
+        section = yaml_load_typed(  # type: ignore[no-untyped-call]
             schema=schema,
             data=yaml.safe_dump(data or {}),
             defaults=schema() if defaults is None else defaults,

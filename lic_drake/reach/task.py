@@ -64,9 +64,7 @@ class GoalArea:
 
     def __post_init__(self) -> None:
         if len(self.lower) != 2 or len(self.upper) != 2:
-            raise ScenarioError(
-                f"goal area corners must be [x, y], got {self.lower}, {self.upper}"
-            )
+            raise ScenarioError(f"goal area corners must be [x, y], got {self.lower}, {self.upper}")
         for name, low, high in zip("xy", self.lower, self.upper, strict=True):
             _check_range(f"goal area {name}", low, high, self.step_m)
 

@@ -20,7 +20,7 @@ class PlanarArm:
     """Base welded at the world origin; joint impedance as implicit PD; satisfies `Arm`."""
 
     name = "planar-arm"
-    link_names = LINK_NAMES
+    link_names: tuple[str, ...] = LINK_NAMES
 
     def __init__(self) -> None:
         plant = MultibodyPlant(time_step=1e-3)

@@ -126,14 +126,13 @@ def _wear_skin(
 ) -> dict[GeometryId, int]:
     """Makes the arm's collision geometry compliant; returns geometry -> link index."""
     source = plant.get_source_id()
+    assert source is not None
     skin_links = {}
     for link, name in enumerate(arm.link_names):
         for geometry in plant.GetCollisionGeometriesForBody(
             plant.GetBodyByName(name, arm_instance)
         ):
-            scene_graph.AssignRole(
-                source, geometry, skin_properties(contact), RoleAssign.kReplace
-            )
+            scene_graph.AssignRole(source, geometry, skin_properties(contact), RoleAssign.kReplace)
             skin_links[geometry] = link
     return skin_links
 
@@ -148,7 +147,9 @@ def _add_sliding_body(
 ) -> RigidBody:
     """Adds a body that slides in the ground plane against dry friction."""
     carriage = plant.AddRigidBody(
-        f"{name}_carriage", clutter, SpatialInertia(1e-3 * mass, np.zeros(3), UnitInertia.SolidSphere(0.01))
+        f"{name}_carriage",
+        clutter,
+        SpatialInertia(1e-3 * mass, np.zeros(3), UnitInertia.SolidSphere(0.01)),
     )
     body = plant.AddRigidBody(
         name, clutter, SpatialInertia(mass, np.zeros(3), UnitInertia.SolidSphere(0.01))
@@ -164,7 +165,7 @@ def _add_sliding_body(
         joint = plant.AddJoint(
             PrismaticJoint(f"{name}_{axis}", parent, child, np.eye(3)["xy".index(axis)])
         )
-        joint.set_default_translation(offset)
+        joint.set_default_positions(np.array([offset]))
         actuator = plant.AddJointActuator(joint.name(), joint, limit)
         actuator.set_controller_gains(gains)
     return body

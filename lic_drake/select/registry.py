@@ -18,7 +18,10 @@ from lic_drake.select.situation import Selection, Situation
 class Selector(Protocol):
     """What every strategy offers."""
 
-    method: str
+    @property
+    def method(self) -> str:
+        """Name of the strategy."""
+        ...
 
     def select(self, situation: Situation) -> Selection:
         """Chooses an initial condition."""

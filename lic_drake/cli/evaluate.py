@@ -1,0 +1,59 @@
+"""`lic evaluate`: compares strategies on unseen environments."""
+
+import argparse
+import os
+from pathlib import Path
+
+from lic_drake.cli.arguments import Subparsers, positive_int
+
+
+def add_parser(subparsers: Subparsers) -> None:
+    """Adds the subcommand to the command line."""
+    parser = subparsers.add_parser(
+        "evaluate",
+        help="compare selection strategies on unseen environments",
+        description="Runs every strategy on the same random goals in the same environments, none"
+        " of them in a library, and prints success rates with Wilson 90 % intervals and"
+        " McNemar's paired test against RND. Run again, it goes on where it was.",
+        epilog="example: lic evaluate out/evaluation --environments 50 --methods rnd gp",
+    )
+    parser.add_argument(
+        "results", metavar="FOLDER", type=Path, help="where the evaluation's reaches are kept"
+    )
+    parser.add_argument(
+        "--methods", nargs="+", default=["rnd", "cost", "gp", "knn"], metavar="NAME"
+    )
+    parser.add_argument("--environments", type=positive_int, default=200, metavar="N")
+    parser.add_argument(
+        "--goals", type=positive_int, default=1, metavar="N", help="goals an environment"
+    )
+    parser.add_argument("--attempts", type=positive_int, default=1, metavar="N")
+    parser.add_argument("--workers", type=positive_int, default=os.cpu_count() or 1, metavar="N")
+    parser.add_argument(
+        "--library",
+        type=Path,
+        metavar="FOLDER",
+        help="experience library (default: the shipped one for cylinder-clutter)",
+    )
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Runs the subcommand and returns the exit code."""
+    from lic_drake.evaluate.experiment import format_rates, run_trials, summarize_trials
+    from lic_drake.experience.store import ExperienceLibrary
+    from lic_drake.paths import shipped_library
+
+    library = ExperienceLibrary(args.library or shipped_library("cylinder-clutter"))
+    trials = run_trials(
+        library.scenario(),
+        library,
+        args.results,
+        args.methods,
+        args.environments,
+        args.goals,
+        args.attempts,
+        args.workers,
+    )
+    print(format_rates(summarize_trials(trials, args.attempts)), end="")
+    return 0

@@ -1,0 +1,144 @@
+"""How good an estimate is in environments it has not seen."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lic_drake.estimate.checks import Vector
+from lic_drake.estimate.estimator import Predictor
+from lic_drake.estimate.features import ExperienceRows
+from lic_drake.estimate.folds import environment_folds
+
+MIN_PROBABILITY = 1e-3
+"""Log losses take probabilities within [1e-3, 1 - 1e-3], for all estimators alike."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CalibrationBin:
+    """Reaches with similar predicted probability.
+
+    Attributes:
+        low: Smallest prediction of the bin.
+        high: Largest prediction of the bin, itself left out but in the last bin.
+        count: Number of reaches.
+        predicted: Their mean prediction.
+        observed: Their share of successes.
+    """
+
+    low: float
+    high: float
+    count: int
+    predicted: float
+    observed: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeldOutPredictions:
+    """Predictions for reaches from fits that never saw their environments.
+
+    Attributes:
+        rows: The reaches.
+        probability: Predicted probability of each, shape (n,).
+        constant: Success rate of the reaches each fit saw: the constant estimate, shape (n,).
+    """
+
+    rows: ExperienceRows
+    probability: Vector
+    constant: Vector
+
+    def gain_by_environment(self) -> Vector:
+        """Returns how much smaller than the constant's the mean log loss is, one per environment.
+
+        Environments are what repeats independently: the mean's standard error follows from these.
+        """
+        gain = _log_losses(self.constant, self.rows.f) - _log_losses(
+            self.probability, self.rows.f
+        )
+        _, index = np.unique(self.rows.environment, return_inverse=True)
+        by_environment: Vector = np.bincount(index, gain) / np.bincount(index)
+        return by_environment
+
+
+def hold_out_environments(
+    make: Callable[[], Predictor], rows: ExperienceRows, *, folds: int = 10
+) -> HeldOutPredictions:
+    """Predicts every reach from a fit on the environments of the other folds.
+
+    Args:
+        make: Returns a new, unfitted estimator.
+        rows: The reaches.
+        folds: Number of groups of environments; with fewer environments, each on its own.
+
+    Raises:
+        EstimateError: Fewer than two environments or folds, or rows that cannot be fitted.
+    """
+    fold = environment_folds(rows.environment, folds)
+    probability, constant = np.empty(len(rows.f)), np.empty(len(rows.f))
+    for held_out in range(fold.max() + 1):
+        out = fold == held_out
+        estimator = make().fit(rows.Z[~out], rows.f[~out], rows.environment[~out])
+        probability[out] = estimator.predict(rows.Z[out]).probability
+        constant[out] = rows.f[~out].mean()
+    return HeldOutPredictions(rows=rows, probability=probability, constant=constant)
+
+
+def log_loss(probability: Vector, f: Vector) -> float:
+    """Returns the mean of -log of the probability given to what happened (see MIN_PROBABILITY)."""
+    return float(_log_losses(probability, f).mean())
+
+
+def brier_score(probability: Vector, f: Vector) -> float:
+    """Returns the mean squared difference between probability and success."""
+    return float(np.mean((probability - f) ** 2))
+
+
+def calibration_curve(
+    probability: Vector, f: Vector, *, num_bins: int = 10
+) -> list[CalibrationBin]:
+    """Compares predicted with observed success rates in equal bins of probability.
+
+    Returns:
+        The bins that hold any reaches, in rising order.
+    """
+    bin_of_row = np.minimum((probability * num_bins).astype(int), num_bins - 1)
+    curve = []
+    for i in np.unique(bin_of_row):
+        members = bin_of_row == i
+        curve.append(
+            CalibrationBin(
+                low=float(i / num_bins),
+                high=float((i + 1) / num_bins),
+                count=int(members.sum()),
+                predicted=float(probability[members].mean()),
+                observed=float(f[members].mean()),
+            )
+        )
+    return curve
+
+
+def selection_success(score: Vector, rows: ExperienceRows, situation: slice) -> float:
+    """Returns the share of successes where each choice goes to the reach with the best score.
+
+    A choice is between all reaches of the same environment and situation, so it takes a library
+    that tried several starts for each. Reaches with equal scores share the choice.
+
+    Args:
+        score: Prediction for each reach, shape (n,).
+        rows: The reaches.
+        situation: The part of z that is given.
+    """
+    given = np.column_stack([rows.environment, rows.Z[:, situation]])
+    _, choice = np.unique(given, axis=0, return_inverse=True)
+    best = np.full(choice.max() + 1, -np.inf)
+    np.maximum.at(best, choice, score)
+    chosen = score == best[choice]
+    success: NDArray[np.float64] = np.bincount(choice[chosen], rows.f[chosen])
+    return float(np.mean(success / np.bincount(choice[chosen])))
+
+
+def _log_losses(probability: Vector, f: Vector) -> Vector:
+    p = np.clip(probability, MIN_PROBABILITY, 1.0 - MIN_PROBABILITY)
+    losses: Vector = -np.where(f > 0.5, np.log(p), np.log1p(-p))
+    return losses

@@ -1,0 +1,111 @@
+"""Local sub-sampling: an estimator fitted on the nearest samples only (paper III-D, [15])."""
+
+from typing import Protocol, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from lic_drake.estimate.checks import (
+    EstimateError,
+    Vector,
+    checked_queries,
+    checked_rows,
+    feature_scale,
+)
+from lic_drake.estimate.estimator import Prediction, SuccessEstimator
+from lic_drake.seeds import make_generator
+
+_CACHE_SIZE = 32
+
+
+class LocalModel(SuccessEstimator, Protocol):
+    """An estimator that can be given other rows without choosing its settings anew."""
+
+    def conditioned_on(self, Z: ArrayLike, f: ArrayLike) -> "LocalModel":
+        """Returns an estimator with these settings that has seen the given rows only."""
+        ...
+
+
+class LocalEstimator:
+    """Fits a model on the rows whose situation is nearest; satisfies `SuccessEstimator`.
+
+    The model chooses its settings once, on a random part of the rows. Rows are near in the
+    situation, not in the decision: one local model then serves a whole optimisation over starts,
+    and value and gradient belong to one smooth function. Rows at equal distance are taken in
+    random order, lest the order of the library choose environments. The spread is the model's.
+
+    Attributes:
+        size: Number of rows in a local model.
+    """
+
+    def __init__(self, model: LocalModel, situation: slice, *, size: int = 1000) -> None:
+        """Sets up an estimator.
+
+        Args:
+            model: Unfitted; `fit` makes it choose its settings.
+            situation: The part of z that says how near a row is.
+            size: See the class.
+
+        Raises:
+            EstimateError: Size below 2.
+        """
+        if size < 2:
+            raise EstimateError(f"a local model needs 2 or more rows, got size {size}")
+        self.size = size
+        self._model = model
+        self._situation = situation
+        self._Z: Vector | None = None
+        self._f = np.zeros(0)
+        self._scale = np.ones(0)
+        self._cache: dict[bytes, SuccessEstimator] = {}
+
+    def fit(self, Z: ArrayLike, f: ArrayLike, environment: ArrayLike | None = None) -> Self:
+        """Keeps features Z, shape (n, d), and successes f, shape (n,); see `Predictor`."""
+        Z, f = checked_rows(Z, f)
+        order = make_generator("training", "order of local rows").permutation(len(Z))
+        part = order[: self.size]
+        self._model.fit(
+            Z[part], f[part], None if environment is None else np.asarray(environment)[part]
+        )
+        self._Z, self._f = Z[order], f[order]
+        self._scale = feature_scale(Z[:, self._situation])
+        self._cache.clear()
+        return self
+
+    def predict(self, Z: ArrayLike) -> Prediction:
+        """Estimates P(success) for queries Z, shape (n, d); see `Predictor`."""
+        Z = checked_queries(Z, self._fitted().shape[1])
+        situations, group = np.unique(Z[:, self._situation], axis=0, return_inverse=True)
+        probability, spread = np.empty(len(Z)), np.empty(len(Z))
+        for i, situation in enumerate(situations):
+            members = group == i
+            prediction = self._local_model(situation).predict(Z[members])
+            probability[members], spread[members] = prediction.probability, prediction.spread
+        return Prediction(probability=probability, spread=spread)
+
+    def value_and_gradient(self, z: ArrayLike) -> tuple[float, Vector]:
+        """Returns the local model's value and gradient at z, shape (d,).
+
+        The model belongs to z's situation: the gradient by the situation leaves out that other
+        situations have other rows.
+        """
+        z = checked_queries(np.atleast_2d(z), self._fitted().shape[1])[0]
+        return self._local_model(z[self._situation]).value_and_gradient(z)
+
+    def _local_model(self, situation: Vector) -> SuccessEstimator:
+        rows = self._fitted()
+        if len(rows) <= self.size:
+            return self._model
+        key = situation.tobytes()
+        if key not in self._cache:
+            offsets = (rows[:, self._situation] - situation) / self._scale
+            nearest = np.argsort(np.sum(offsets**2, axis=1), kind="stable")[: self.size]
+            if len(self._cache) >= _CACHE_SIZE:
+                del self._cache[next(iter(self._cache))]
+            self._cache[key] = self._model.conditioned_on(rows[nearest], self._f[nearest])
+        return self._cache[key]
+
+    def _fitted(self) -> Vector:
+        if self._Z is None:
+            raise EstimateError("the local estimator has no rows yet; call fit(Z, f) first")
+        return self._Z

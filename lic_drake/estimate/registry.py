@@ -1,0 +1,49 @@
+"""The known success estimators. A new one is a new file and one line here."""
+
+from collections.abc import Callable
+
+from lic_drake.estimate.checks import EstimateError
+from lic_drake.estimate.estimator import SuccessEstimator
+from lic_drake.estimate.features import PLANAR_LIC1, FeatureMap
+from lic_drake.estimate.gaussian_process import GaussianProcess
+from lic_drake.estimate.local import LocalEstimator
+from lic_drake.estimate.nearest_neighbours import NearestNeighbours
+
+EstimatorFactory = Callable[[FeatureMap], SuccessEstimator]
+
+_ESTIMATORS: dict[str, EstimatorFactory] = {}
+
+
+def register_estimator(name: str, factory: EstimatorFactory) -> None:
+    """Makes an estimator known under `name`; `factory` returns a new, unfitted one."""
+    _ESTIMATORS[name] = factory
+
+
+def make_estimator(name: str, features: FeatureMap = PLANAR_LIC1) -> SuccessEstimator:
+    """Returns a new, unfitted estimator.
+
+    Args:
+        name: One of `estimator_names`.
+        features: What z means.
+
+    Raises:
+        EstimateError: The estimator is unknown.
+    """
+    if name not in _ESTIMATORS:
+        raise EstimateError(
+            f"unknown estimator {name!r}; choose one of {', '.join(estimator_names())}"
+        )
+    return _ESTIMATORS[name](features)
+
+
+def estimator_names() -> tuple[str, ...]:
+    """Returns the names of all known estimators, the default first."""
+    return tuple(_ESTIMATORS)
+
+
+register_estimator("gp", lambda features: GaussianProcess())
+register_estimator("knn", lambda features: NearestNeighbours())
+register_estimator(
+    "gp-raw",
+    lambda features: LocalEstimator(GaussianProcess(average=False), features.situation),
+)

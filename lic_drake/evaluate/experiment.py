@@ -1,0 +1,225 @@
+"""Trials of several strategies on the same unseen environments, resumable."""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import binomtest
+
+from lic_drake.evaluate.trial import planar_arm_of
+from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.intervals import wilson_interval
+from lic_drake.reach.request import ReachRecord, ReachRequest
+from lic_drake.reach.rollout import run_reach
+from lic_drake.reach.scenario import Scenario
+from lic_drake.seeds import make_generator
+from lic_drake.select.registry import make_selector, needs_library
+from lic_drake.select.situation import Selection, Situation, StartSet
+
+CHUNK = 20
+"""Reaches to a shard: what an interruption can lose at the most, for each worker."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trial:
+    """The attempts of one strategy at one goal, in their order."""
+
+    method: str
+    environment: int
+    goal: int
+    selections: tuple[Selection, ...]
+    records: tuple[ReachRecord, ...]
+
+    def success(self, attempts: int) -> bool:
+        """Tells whether one of the first `attempts` attempts reached the goal."""
+        return any(record.success for record in self.records[:attempts])
+
+
+def run_trials(
+    scenario: Scenario,
+    experience: ExperienceLibrary,
+    results: Path,
+    methods: Sequence[str],
+    environments: int,
+    goals: int,
+    attempts: int = 1,
+    workers: int = 1,
+    say: Callable[[str], None] = print,
+) -> list[Trial]:
+    """Runs every strategy on the same goals in the same evaluation environments.
+
+    Reaches are kept in a library under `results` and not simulated again. Every attempt finds
+    the environment as it was drawn.
+
+    Args:
+        scenario: The experience library's scenario.
+        experience: What the strategies learn from.
+        results: Folder of the library of evaluation reaches.
+        methods: Strategies, see `lic_drake.select.registry.method_names`.
+        environments: Number of evaluation environments, from index 0.
+        goals: Number of random goals in each.
+        attempts: How many attempts at a goal at the most.
+        workers: Number of processes.
+        say: Gets a line now and then.
+
+    Raises:
+        LicError: A method is unknown, or a library cannot be read or written.
+    """
+    columns = experience.columns() if any(needs_library(method) for method in methods) else None
+    arm = planar_arm_of(scenario)
+    starts = StartSet(arm=arm, line=scenario.task.start_line)
+    trials = [
+        Trial(method=method, environment=e, goal=g, selections=(), records=())
+        for method in methods
+        for e in range(environments)
+        for g in range(goals)
+    ]
+    library = ExperienceLibrary(results)
+    library.create()
+    for attempt in range(attempts):
+        open_trials = [trial for trial in trials if not trial.success(attempt)]
+        chosen: list[tuple[Trial, Selection, ReachRequest]] = []
+        for method in methods:
+            selector = make_selector(method, arm, columns, np.random.default_rng(0))
+            for trial in (trial for trial in open_trials if trial.method == method):
+                p_WG = scenario.sample_goal("evaluation", trial.environment, trial.goal)
+                if method == "rnd":
+                    # A draw of its own for every trial: independent of how many others there are.
+                    rng = make_generator(
+                        "evaluation", "rnd", trial.environment, trial.goal, attempt
+                    )
+                    selector = make_selector(method, arm, columns, rng)
+                failed = tuple(selection.x0 for selection in trial.selections)
+                situation = Situation(p_WG=p_WG, starts=starts, failed=failed)
+                selection = selector.select(situation)
+                chosen.append((trial, selection, _request(scenario, trial, p_WG, selection)))
+        say(f"attempt {attempt + 1}: {len(chosen)} starts chosen")
+        records = simulate_requests([c[2] for c in chosen], library, scenario, workers, say)
+        extended = {
+            (trial.method, trial.environment, trial.goal): Trial(
+                method=trial.method,
+                environment=trial.environment,
+                goal=trial.goal,
+                selections=(*trial.selections, selection),
+                records=(*trial.records, records[request.key]),
+            )
+            for trial, selection, request in chosen
+        }
+        trials = [extended.get((t.method, t.environment, t.goal), t) for t in trials]
+    return trials
+
+
+def simulate_requests(
+    requests: Sequence[ReachRequest],
+    library: ExperienceLibrary,
+    scenario: Scenario,
+    workers: int,
+    say: Callable[[str], None],
+) -> dict[str, ReachRecord]:
+    """Returns the records of requests by key, simulating those that the library lacks."""
+    records = {record.key: record for record in library.records()} if _has_rows(library) else {}
+    missing = list({r.key: r for r in requests if r.key not in records}.values())
+    missing.sort(key=lambda request: request.environment)
+    chunks = [missing[i : i + CHUNK] for i in range(0, len(missing), CHUNK)]
+    with ProcessPoolExecutor(workers, mp_context=get_context("forkserver")) as executor:
+        futures = {executor.submit(_run_chunk, chunk): chunk for chunk in chunks}
+        done = 0
+        for future in as_completed(futures):
+            rows = future.result()
+            library.write_shard(f"reaches-{rows[0].key}", rows, scenario)
+            records.update({row.key: row for row in rows})
+            done += len(rows)
+            say(f"  {done}/{len(missing)} reaches simulated")
+    return records
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rate:
+    """A strategy's success rate after a number of attempts.
+
+    Attributes:
+        method: Name of the strategy.
+        attempts: How many attempts count.
+        successes: Trials that reached the goal.
+        trials: All trials.
+        p_value: Of McNemar's exact paired test against RND on the same goals; NaN for RND.
+    """
+
+    method: str
+    attempts: int
+    successes: int
+    trials: int
+    p_value: float
+
+
+def summarize_trials(trials: Sequence[Trial], attempts: int) -> list[Rate]:
+    """Returns the success rate of each strategy after 1 to `attempts` attempts."""
+    methods = list(dict.fromkeys(trial.method for trial in trials))
+    rates = []
+    for count in range(1, attempts + 1):
+        won = {
+            method: np.array([t.success(count) for t in trials if t.method == method])
+            for method in methods
+        }
+        for method in methods:
+            rates.append(
+                Rate(
+                    method=method,
+                    attempts=count,
+                    successes=int(won[method].sum()),
+                    trials=len(won[method]),
+                    p_value=mcnemar(won[method], won["rnd"])
+                    if "rnd" in won and method != "rnd"
+                    else float("nan"),
+                )
+            )
+    return rates
+
+
+def mcnemar(a: NDArray[np.bool_], b: NDArray[np.bool_]) -> float:
+    """Returns the p-value of McNemar's exact test for paired successes, shape (n,) each."""
+    only_a, only_b = int(np.sum(a & ~b)), int(np.sum(b & ~a))
+    if only_a + only_b == 0:
+        return 1.0
+    return float(binomtest(only_a, only_a + only_b).pvalue)
+
+
+def format_rates(rates: Sequence[Rate]) -> str:
+    """Returns the rates as a Markdown table."""
+    lines = [
+        "| strategy | attempts | success, % | 90 % interval | trials | p against RND |",
+        "|---|---|---|---|---|---|",
+    ]
+    for rate in rates:
+        low, high = wilson_interval(rate.successes, rate.trials)
+        p = "" if np.isnan(rate.p_value) else f"{rate.p_value:.2g}"
+        lines.append(
+            f"| {rate.method} | {rate.attempts} | {100 * rate.successes / rate.trials:.1f} |"
+            f" {100 * low:.1f}..{100 * high:.1f} | {rate.trials} | {p} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def _request(
+    scenario: Scenario, trial: Trial, p_WG: NDArray[np.float64], selection: Selection
+) -> ReachRequest:
+    x0 = selection.x0
+    return ReachRequest(
+        scenario=scenario,
+        stream="evaluation",
+        environment=trial.environment,
+        goal=(float(p_WG[0]), float(p_WG[1]), float(p_WG[2])),
+        start=(float(x0[0]), float(x0[1]), float(x0[2])),
+    )
+
+
+def _run_chunk(requests: list[ReachRequest]) -> list[ReachRecord]:
+    return [run_reach(request) for request in requests]
+
+
+def _has_rows(library: ExperienceLibrary) -> bool:
+    return bool(library.shard_paths())
