@@ -75,4 +75,5 @@ def _nearest_to_origin(G: Vector, h: Vector) -> Vector | None:
     residual = E @ multipliers - f
     if -residual[-1] < _INFEASIBLE:
         return None
-    return -scale * residual[:-1] / residual[-1]
+    y: Vector = -scale * residual[:-1] / residual[-1]
+    return y
