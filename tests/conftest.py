@@ -2,11 +2,17 @@
 
 import os
 import shutil
+import signal
 
 import pytest
 from hypothesis import settings
 
 os.environ["MPLBACKEND"] = "Agg"
+
+# A shell without job control ignores Ctrl-C in what it runs in the background, and child processes
+# inherit that; tests that interrupt a child would wait forever.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # A first example may pay for Drake's import or a plant; CI must not fail on a lucky draw.
 settings.register_profile("lic", deadline=None, derandomize=bool(os.environ.get("CI")))

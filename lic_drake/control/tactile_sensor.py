@@ -36,7 +36,16 @@ class TactileSensor(LeafSystem):
             "contact_results", Value(ContactResults())
         )
         self._arm_state = self.DeclareVectorInputPort("arm_state", 2 * len(arm.q_min))
-        self.DeclareVectorOutputPort("taxel_force", layout.num_taxels, self._calc_taxel_force)
+        self.DeclareVectorOutputPort(
+            "taxel_force",
+            layout.num_taxels,
+            self._calc_taxel_force,
+            # Without time among them, so that all readers of an instant share one calculation.
+            prerequisites_of_calc={
+                self.input_port_ticket(self._contact_results.get_index()),
+                self.input_port_ticket(self._arm_state.get_index()),
+            },
+        )
 
     def _calc_taxel_force(self, context: Context, output: BasicVector) -> None:
         results = cast(ContactResults, self._contact_results.Eval(context))

@@ -7,6 +7,7 @@ alone, so nothing is lost if rows of the same pair become one row with a count.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lic_drake.estimate.checks import Vector
 
@@ -19,11 +20,13 @@ class AveragedRows:
         Z: Features, shape (m, d), in lexicographic order.
         rate: Share of successes, shape (m,).
         count: Number of reaches, shape (m,).
+        member: Index among the m of each reach, shape (n,).
     """
 
     Z: Vector
     rate: Vector
     count: Vector
+    member: NDArray[np.intp]
 
 
 def average_rows(Z: Vector, f: Vector) -> AveragedRows:
@@ -34,7 +37,9 @@ def average_rows(Z: Vector, f: Vector) -> AveragedRows:
     first = np.flatnonzero(is_first)
     count = np.diff(np.r_[first, len(Z)]).astype(float)
     rate = np.add.reduceat(f[order], first) / count
-    return AveragedRows(Z=sorted_Z[first], rate=rate, count=count)
+    member = np.empty(len(Z), dtype=np.intp)
+    member[order] = np.cumsum(is_first) - 1
+    return AveragedRows(Z=sorted_Z[first], rate=rate, count=count, member=member)
 
 
 def reach_variance(rows: AveragedRows) -> float:

@@ -24,8 +24,9 @@ def query_neighbours(
     """
     k = min(neighbours, tree.n)
     distance, index = tree.query(queries, k=k)
-    # For a single neighbour the tree leaves out their axis.
-    return (distance[..., None], index[..., None]) if k == 1 else (distance, index)
+    if k == 1:  # the tree then leaves out the axis of neighbours
+        return np.expand_dims(distance, -1), np.expand_dims(index, -1)
+    return distance, index
 
 
 def gaussian_weights(distance: Vector, bandwidth: float) -> Vector:

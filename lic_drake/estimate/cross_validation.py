@@ -49,13 +49,11 @@ class HeldOutPredictions:
     constant: Vector
 
     def gain_by_environment(self) -> Vector:
-        """Returns how much smaller than the constant's the mean log loss is, one per environment.
+        """Returns the log loss saved against the constant rate, one mean per environment.
 
-        Environments are what repeats independently: the mean's standard error follows from these.
+        Environments are what repeats independently, so that standard errors follow from these.
         """
-        gain = _log_losses(self.constant, self.rows.f) - _log_losses(
-            self.probability, self.rows.f
-        )
+        gain = _log_losses(self.constant, self.rows.f) - _log_losses(self.probability, self.rows.f)
         _, index = np.unique(self.rows.environment, return_inverse=True)
         by_environment: Vector = np.bincount(index, gain) / np.bincount(index)
         return by_environment
@@ -82,6 +80,37 @@ def hold_out_environments(
         probability[out] = estimator.predict(rows.Z[out]).probability
         constant[out] = rows.f[~out].mean()
     return HeldOutPredictions(rows=rows, probability=probability, constant=constant)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scores:
+    """How good held-out predictions are.
+
+    Attributes:
+        log_loss: See `log_loss`; smaller is better.
+        gain: Mean over environments of the log loss saved against the constant rate.
+        gain_error: Standard error of that mean.
+        brier: See `brier_score`; smaller is better.
+        selected: See `selection_success`; larger is better.
+    """
+
+    log_loss: float
+    gain: float
+    gain_error: float
+    brier: float
+    selected: float
+
+
+def score(held_out: HeldOutPredictions, situation: slice) -> Scores:
+    """Returns the scores of predictions; `situation` is the part of z that is given."""
+    gain = held_out.gain_by_environment()
+    return Scores(
+        log_loss=log_loss(held_out.probability, held_out.rows.f),
+        gain=float(gain.mean()),
+        gain_error=float(gain.std(ddof=1) / np.sqrt(len(gain))),
+        brier=brier_score(held_out.probability, held_out.rows.f),
+        selected=selection_success(held_out.probability, held_out.rows, situation),
+    )
 
 
 def log_loss(probability: Vector, f: Vector) -> float:

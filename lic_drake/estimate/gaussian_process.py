@@ -93,7 +93,7 @@ class GaussianProcess:
     def _rows(self, Z: Vector, f: Vector) -> AveragedRows:
         if self.average:
             return average_rows(Z, f)
-        return AveragedRows(Z=Z, rate=f, count=np.ones(len(f)))
+        return AveragedRows(Z=Z, rate=f, count=np.ones(len(f)), member=np.arange(len(f)))
 
     def _choose_hyperparameters(
         self, Z: Vector, f: Vector, fold: NDArray[np.intp]

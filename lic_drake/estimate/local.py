@@ -89,8 +89,8 @@ class LocalEstimator:
         The model belongs to z's situation: the gradient by the situation leaves out that other
         situations have other rows.
         """
-        z = checked_queries(np.atleast_2d(z), self._fitted().shape[1])[0]
-        return self._local_model(z[self._situation]).value_and_gradient(z)
+        query = checked_queries(np.atleast_2d(z), self._fitted().shape[1])[0]
+        return self._local_model(query[self._situation]).value_and_gradient(query)
 
     def _local_model(self, situation: Vector) -> SuccessEstimator:
         rows = self._fitted()

@@ -88,8 +88,7 @@ class NearestNeighbours:
         tree = cKDTree(points)
         if self._given is None:
             fold = selection_folds(environment, len(f))
-            _, point = tree.query(Z / scale)
-            self._chosen = select_bandwidth(tree, self.neighbours, point, f, fold)
+            self._chosen = select_bandwidth(tree, self.neighbours, rows.member, f, fold)
         self._points = _Points(
             tree=tree, points=points, rate=rows.rate, count=rows.count, scale=scale
         )

@@ -63,8 +63,8 @@ class Slot:
             except BrokenExecutor:  # The worker died while it was idle.
                 self._renew()
                 self._future = self._executor.submit(run_task, state.task)
-        self._tasks += 1
-        self.state = state
+            self._tasks += 1
+            self.state = state
 
     def take(self) -> tuple[TaskState, Exception | None] | None:
         """Returns an ended task with what went wrong, if anything, and makes the slot idle."""

@@ -18,15 +18,24 @@ def make_process_pool() -> ProcessPoolExecutor:
 
 @contextmanager
 def ctrl_c_held_back() -> Iterator[None]:
-    """Keeps Ctrl-C from processes that start within; it takes effect here afterwards.
+    """Lets Ctrl-C take effect only after the block; processes that start in it never see it.
 
-    A worker would print a traceback if it were interrupted before `_prepare_worker` runs.
+    An executor that is interrupted while it starts a worker would forget about the worker, and
+    a worker that is interrupted before `_prepare_worker` runs would print a traceback.
     """
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    if threading.current_thread() is not threading.main_thread():
+        yield  # Python interrupts the main thread only.
+        return
+    held: list[int] = []
+    handler = signal.signal(signal.SIGINT, lambda number, _: held.append(number))
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        signal.signal(signal.SIGINT, handler)
+        if held:
+            signal.raise_signal(signal.SIGINT)
 
 
 def _prepare_worker() -> None:

@@ -84,6 +84,7 @@ def add_scene(
             time_step=config.time_step_s,
             discrete_contact_approximation=config.contact_approximation,
             contact_model="hydroelastic_with_fallback",
+            use_sampled_output_ports=False,
         ),
         builder,
     )

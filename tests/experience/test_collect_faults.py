@@ -5,9 +5,10 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 from fake_reach import FakeReach, comparable, expected_records, make_record, make_request
@@ -20,10 +21,13 @@ from lic_drake.reach.request import ReachRecord, ReachRequest
 
 REQUEST = make_request()
 
+Start = Callable[..., "subprocess.Popen[str]"]
+
 COLLECT = """
 import sys
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from fake_reach import FakeReach
 from lic_drake.cli.main import main
 import lic_drake.experience.collect as module
@@ -44,18 +48,19 @@ def reach(tmp_path: Path) -> FakeReach:
     return FakeReach(log=tmp_path / "calls")
 
 
-def start(
-    library: ExperienceLibrary, reach: FakeReach, sleep_s: float = 0.1
-) -> "subprocess.Popen[str]":
+@pytest.fixture
+def start(library: ExperienceLibrary, reach: FakeReach) -> Iterator[Start]:
     """Starts `lic collect` with the fake reach in a process group of its own."""
-    return subprocess.Popen(
-        [sys.executable, "-c", COLLECT, str(library.path), str(reach.log), str(sleep_s)],
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
+    # A killed process leaves its temporary files, and pytest's folders are too deep for a socket.
+    with TemporaryDirectory() as folder:
+        yield lambda sleep_s=0.1: subprocess.Popen(
+            [sys.executable, "-c", COLLECT, str(library.path), str(reach.log), str(sleep_s)],
+            env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[1]), "TMPDIR": folder},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
 
 
 def wait_until(condition: Callable[[], bool], timeout_s: float = 60.0) -> None:
@@ -138,9 +143,9 @@ def test_a_disk_that_refuses_the_worker_is_one_line_and_loses_nothing(
 
 
 def test_ctrl_c_stops_quietly_and_the_same_command_goes_on(
-    library: ExperienceLibrary, reach: FakeReach
+    library: ExperienceLibrary, reach: FakeReach, start: Start
 ) -> None:
-    process = start(library, reach)
+    process = start()
     wait_until(lambda: len(reach.calls()) >= 5)
     os.killpg(process.pid, signal.SIGINT)
     output, error = process.communicate(timeout=60)
@@ -153,7 +158,7 @@ def test_ctrl_c_stops_quietly_and_the_same_command_goes_on(
     assert kept < 36
     assert not any(is_alive(worker) for worker in reach.processes())
 
-    output, error = start(library, reach).communicate(timeout=60)
+    output, error = start().communicate(timeout=60)
     assert error == ""
     assert f"36 of 36 reaches ({36 - kept} new" in output
     assert comparable(library.records()) == expected_records(REQUEST)
@@ -161,9 +166,9 @@ def test_ctrl_c_stops_quietly_and_the_same_command_goes_on(
 
 
 def test_a_second_ctrl_c_does_not_wait_for_the_running_reaches(
-    library: ExperienceLibrary, reach: FakeReach
+    library: ExperienceLibrary, start: Start
 ) -> None:
-    process = start(library, reach, sleep_s=600.0)
+    process = start(sleep_s=600.0)
     wait_until(lambda: len(list(library.path.glob("_*.partial.jsonl"))) == 2)
     os.killpg(process.pid, signal.SIGINT)
     wait_until(lambda: not (library.path / "_collecting").exists())
@@ -174,9 +179,9 @@ def test_a_second_ctrl_c_does_not_wait_for_the_running_reaches(
 
 
 def test_a_killed_collection_leaves_no_workers_and_loses_no_finished_reach(
-    library: ExperienceLibrary, reach: FakeReach
+    library: ExperienceLibrary, reach: FakeReach, start: Start
 ) -> None:
-    process = start(library, reach)
+    process = start()
     wait_until(lambda: len(reach.processes()) == 2 and len(reach.calls()) >= 5)
     workers = reach.processes()
     process.kill()

@@ -1,0 +1,123 @@
+import numpy as np
+import pytest
+from sklearn.metrics import brier_score_loss
+from sklearn.metrics import log_loss as sklearn_log_loss
+
+from lic_drake.estimate.checks import EstimateError
+from lic_drake.estimate.cross_validation import (
+    brier_score,
+    calibration_curve,
+    hold_out_environments,
+    log_loss,
+    score,
+    selection_success,
+)
+from lic_drake.estimate.estimator import Prediction
+from lic_drake.estimate.features import ExperienceRows
+
+
+class EnvironmentSpy:
+    """Predicts 0.5 and notes the environment, kept in the only feature, of what it is given."""
+
+    def __init__(self, log: list[tuple[set[float], set[float]]]) -> None:
+        self.log = log
+
+    def fit(self, Z, f, environment):
+        assert np.array_equal(Z[:, 0], environment)
+        self.seen = set(Z[:, 0])
+        return self
+
+    def predict(self, Z):
+        self.log.append((self.seen, set(Z[:, 0])))
+        return Prediction(probability=np.full(len(Z), 0.5), spread=np.zeros(len(Z)))
+
+
+class Memory:
+    """Predicts what it has seen of the same features, else the rate: overfits all it can."""
+
+    def fit(self, Z, f, environment):
+        self.rate = f.mean()
+        self.known = dict(zip(map(tuple, Z), f, strict=True))
+        return self
+
+    def predict(self, Z):
+        p = np.array([self.known.get(tuple(z), self.rate) for z in Z])
+        return Prediction(probability=p, spread=np.zeros(len(Z)))
+
+
+def _rows(Z, f, environment) -> ExperienceRows:
+    return ExperienceRows(
+        Z=np.asarray(Z, float), f=np.asarray(f, float), environment=np.asarray(environment)
+    )
+
+
+@pytest.mark.parametrize(("folds", "fits"), [(10, 7), (3, 3)])
+def test_no_fit_sees_an_environment_that_it_predicts(folds: int, fits: int) -> None:
+    environment = np.repeat(np.arange(7), 5)
+    log: list[tuple[set[float], set[float]]] = []
+    rows = _rows(environment[:, None], environment % 2, environment)
+    hold_out_environments(lambda: EnvironmentSpy(log), rows, folds=folds)
+    assert len(log) == fits
+    for seen, asked in log:
+        assert not seen & asked
+        assert seen | asked == set(range(7))
+
+
+def test_learning_by_heart_gains_nothing_on_coin_tosses() -> None:
+    rng = np.random.default_rng(0)
+    Z = np.tile(np.arange(50.0)[:, None], (4, 1))
+    rows = _rows(Z, rng.integers(0, 2, 200), np.repeat(np.arange(4), 50))
+    result = score(hold_out_environments(Memory, rows), slice(0, 1))
+    assert result.gain < -1.0
+    assert result.log_loss > np.log(2.0)
+
+
+def test_gain_is_against_the_rate_of_the_other_environments() -> None:
+    rows = _rows([[0.0]] * 4, [1, 1, 1, 0], [0, 0, 1, 1])
+    held_out = hold_out_environments(Memory, rows)
+    np.testing.assert_allclose(held_out.constant, [0.5, 0.5, 1.0, 1.0])
+    gain = held_out.gain_by_environment()
+    expected = log_loss(held_out.constant, rows.f) - log_loss(held_out.probability, rows.f)
+    assert gain.mean() == pytest.approx(expected)
+    result = score(held_out, slice(0, 1))
+    assert result.gain_error == pytest.approx(abs(gain[0] - gain[1]) / 2.0)
+
+
+def test_scores_equal_those_of_scikit_learn() -> None:
+    rng = np.random.default_rng(0)
+    p, f = rng.uniform(0.01, 0.99, 100), rng.integers(0, 2, 100).astype(float)
+    assert log_loss(p, f) == pytest.approx(sklearn_log_loss(f, p))
+    assert brier_score(p, f) == pytest.approx(brier_score_loss(f, p))
+
+
+def test_a_certain_but_wrong_prediction_has_a_finite_log_loss() -> None:
+    assert log_loss(np.array([1.0]), np.array([0.0])) == pytest.approx(-np.log(1e-3))
+
+
+def test_the_calibration_curve_counts_and_averages_each_bin() -> None:
+    p = np.array([0.05, 0.0, 0.95, 1.0, 0.5])
+    f = np.array([0.0, 1.0, 1.0, 1.0, 0.0])
+    low, middle, high = calibration_curve(p, f)
+    assert (low.low, low.high, low.count, low.observed) == (0.0, 0.1, 2, 0.5)
+    assert low.predicted == pytest.approx(0.025)
+    assert (middle.low, middle.count, middle.observed) == (0.5, 1, 0.0)
+    assert (high.high, high.count, high.observed) == (1.0, 2, 1.0)
+
+
+def test_selection_goes_to_the_best_score_within_environment_and_goal() -> None:
+    #              goal, start
+    Z = [[0, 0], [0, 1], [1, 0], [1, 1], [0, 0], [0, 1]]
+    rows = _rows(Z, [1, 0, 0, 1, 0, 1], [0, 0, 0, 0, 1, 1])
+    prefer_first = np.array([0.9, 0.1] * 3)
+    assert selection_success(prefer_first, rows, slice(0, 1)) == pytest.approx(1.0 / 3.0)
+    assert selection_success(-prefer_first, rows, slice(0, 1)) == pytest.approx(2.0 / 3.0)
+
+
+def test_equal_scores_select_at_random() -> None:
+    rows = _rows([[0, 0], [0, 1], [0, 2], [0, 3]], [1, 0, 0, 0], [0, 0, 0, 0])
+    assert selection_success(np.ones(4), rows, slice(0, 1)) == 0.25
+
+
+def test_a_single_environment_cannot_be_held_out() -> None:
+    with pytest.raises(EstimateError, match="got 1 and 10"):
+        hold_out_environments(Memory, _rows([[0.0], [1.0]], [0, 1], [3, 3]))
