@@ -40,5 +40,6 @@ def add_scenario_arguments(parser: argparse.ArgumentParser) -> None:
         "--set",
         metavar="YAML",
         default="",
-        help='values put over the scenario, for instance "{stop: {timeout_s: 20}}" (SI units)',
+        help='values put over the scenario, for instance "{stop: {timeout_s: 20}}", SI units'
+        " (default: none)",
     )

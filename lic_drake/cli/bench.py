@@ -20,7 +20,9 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--reaches", type=positive_int, default=50, metavar="N", help="default: %(default)s"
     )
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument(
+        "--json", action="store_true", help="print one JSON object (default: a few lines)"
+    )
     parser.set_defaults(run=run)
 
 

@@ -21,14 +21,25 @@ def add_parser(subparsers: Subparsers) -> None:
         "results", metavar="FOLDER", type=Path, help="where the evaluation's reaches are kept"
     )
     parser.add_argument(
-        "--methods", nargs="+", default=["rnd", "cost", "gp", "knn"], metavar="NAME"
+        "--methods",
+        nargs="+",
+        default=["rnd", "cost", "gp", "knn"],
+        metavar="NAME",
+        help="strategies to compare (default: rnd cost gp knn)",
     )
-    parser.add_argument("--environments", type=positive_int, default=200, metavar="N")
-    parser.add_argument(
-        "--goals", type=positive_int, default=1, metavar="N", help="goals an environment"
-    )
-    parser.add_argument("--attempts", type=positive_int, default=1, metavar="N")
-    parser.add_argument("--workers", type=positive_int, default=os.cpu_count() or 1, metavar="N")
+    for name, default, text in (
+        ("--environments", 200, "number of environments"),
+        ("--goals", 1, "goals in each"),
+        ("--attempts", 1, "attempts at a goal at the most"),
+        ("--workers", os.cpu_count() or 1, "number of processes; the default is one a core"),
+    ):
+        parser.add_argument(
+            name,
+            type=positive_int,
+            default=default,
+            metavar="N",
+            help=f"{text} (default: %(default)s)",
+        )
     parser.add_argument(
         "--library",
         type=Path,

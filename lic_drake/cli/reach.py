@@ -23,7 +23,9 @@ def add_parser(subparsers: Subparsers) -> None:
     )
     add_scenario_arguments(parser)
     parser.add_argument(
-        "--stream", default="evaluation", help="seed stream of the environment (%(default)s)"
+        "--stream",
+        default="evaluation",
+        help="seed stream of the environment (default: %(default)s)",
     )
     parser.add_argument(
         "--environment", type=int, default=0, metavar="N", help="its index (default: 0)"
@@ -50,12 +52,22 @@ def add_parser(subparsers: Subparsers) -> None:
         metavar="DEG",
         help="start orientation of the hand, degrees from straight ahead (default: 60)",
     )
-    parser.add_argument("--json", action="store_true", help="print the record as a JSON object")
     parser.add_argument(
-        "--record", type=Path, metavar="FILE.html", help="write a recording that plays offline"
+        "--json",
+        action="store_true",
+        help="print the record as a JSON object (default: a sentence)",
     )
     parser.add_argument(
-        "--diagram", type=Path, metavar="FILE.svg", help="draw the Drake diagram (.svg .png .pdf)"
+        "--record",
+        type=Path,
+        metavar="FILE.html",
+        help="write a recording that plays offline (default: none)",
+    )
+    parser.add_argument(
+        "--diagram",
+        type=Path,
+        metavar="FILE.svg",
+        help="draw the Drake diagram: .svg, .png or .pdf (default: none)",
     )
     parser.set_defaults(run=run)
 

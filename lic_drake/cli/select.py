@@ -17,7 +17,12 @@ def add_parser(subparsers: Subparsers) -> None:
         epilog="example: lic select --goal 0.6 0.1 --method gp",
     )
     parser.add_argument(
-        "--goal", type=float, nargs=2, required=True, metavar=("X", "Y"), help="goal in metres"
+        "--goal",
+        type=float,
+        nargs=2,
+        required=True,
+        metavar=("X", "Y"),
+        help="goal in metres (no default: must be given)",
     )
     parser.add_argument(
         "--method",
@@ -32,7 +37,7 @@ def add_parser(subparsers: Subparsers) -> None:
         action="append",
         default=[],
         metavar=("Y", "DEG"),
-        help="start (metres, degrees) of an attempt that failed; may be given several times",
+        help="start (metres, degrees) of an attempt that failed; may be given several times (default: none)",
     )
     parser.add_argument(
         "--library",
@@ -43,7 +48,9 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--seed", type=non_negative_int, default=0, metavar="N", help="for rnd (default: 0)"
     )
-    parser.add_argument("--json", action="store_true", help="print a JSON object")
+    parser.add_argument(
+        "--json", action="store_true", help="print a JSON object (default: a sentence)"
+    )
     parser.set_defaults(run=run)
 
 

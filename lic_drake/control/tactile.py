@@ -53,29 +53,29 @@ def calc_taxel_forces(
         mine = np.flatnonzero(layout.link == patch.link)
         R, p = R_RL[patch.link], p_RL[patch.link]
         p_RT = p + layout.p_LT[mine] @ R.T
-        n_R = layout.n_L[mine] @ R.T
-        taxels = _nearest(p_RT, n_R, patch.p_RQ, patch.f_R)
+        taxels = np.argmin(np.sum((patch.p_RQ[:, None] - p_RT) ** 2, axis=2), axis=1)
         span = np.ptp(p_RT[taxels], axis=0)
         if span @ span <= (1.5 * layout.pitch_m) ** 2:
             p_RC = magnitudes @ patch.p_RQ / total
-            f_R = patch.f_R.sum(axis=0, keepdims=True)
-            taxels = _nearest(p_RT, n_R, p_RC[None], f_R)
-            # Not the sum of the faces' magnitudes: the facets of a coarse contact mesh splay
-            # their forces, which would read up to 11 % too much.
-            magnitudes = np.linalg.norm(f_R, axis=1)
-        np.add.at(forces, mine[taxels], magnitudes)
+            # Not the sum of the faces' magnitudes: the facets of a coarse contact mesh and the
+            # sides of a corner splay their forces.
+            f_R = patch.f_R.sum(axis=0)
+            taxel = _nearest_facing(p_RT, layout.n_L[mine] @ R.T, p_RC, f_R)
+            forces[mine[taxel]] += np.linalg.norm(f_R)
+        else:
+            np.add.at(forces, mine[taxels], magnitudes)
     return forces
 
 
-def _nearest(
+def _nearest_facing(
     p_RT: NDArray[np.float64],
     n_R: NDArray[np.float64],
-    p_RQ: NDArray[np.float64],
+    p_RC: NDArray[np.float64],
     f_R: NDArray[np.float64],
-) -> NDArray[np.intp]:
-    """Returns for each point Q the nearest taxel among those that face its force, shape (k,)."""
-    distance = np.sum((p_RQ[:, None] - p_RT) ** 2, axis=2)
-    facing = f_R @ n_R.T >= MAX_ANGLE_COS * np.linalg.norm(f_R, axis=1, keepdims=True)
-    # Where no taxel faces the force, the nearest one takes it: no force is lost.
-    facing |= ~np.any(facing, axis=1, keepdims=True)
-    return np.argmin(np.where(facing, distance, np.inf), axis=1)
+) -> np.intp:
+    """Returns the taxel nearest to the contact point C among those that face its force."""
+    facing = n_R @ f_R >= MAX_ANGLE_COS * np.linalg.norm(f_R)
+    if not np.any(facing):  # Then the nearest one takes it: no force is lost.
+        facing[:] = True
+    distance = np.sum((p_RC - p_RT) ** 2, axis=1)
+    return np.argmin(np.where(facing, distance, np.inf))

@@ -78,6 +78,8 @@ def load_scenario(name_or_path: str | Path, overrides: str = "") -> Scenario:
         path = scenarios_dir() / f"{name_or_path}.yaml"
     try:
         content = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise ScenarioError(f"{path} is not a text file; a scenario is YAML in UTF-8") from None
     except OSError:
         known = ", ".join(sorted(p.stem for p in scenarios_dir().glob("*.yaml")))
         raise ScenarioError(

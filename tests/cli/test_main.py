@@ -10,6 +10,11 @@ from lic_drake.cli.main import main
 from lic_drake.errors import LicError
 
 COMMANDS = [
+    ["demo"],
+    ["reach"],
+    ["select"],
+    ["evaluate"],
+    ["bench"],
     ["collect"],
     ["experience"],
     ["experience", "info"],

@@ -30,8 +30,15 @@ class Library:
     environment: NDArray[np.int64]
 
 
+@dataclass(frozen=True)
 class World:
-    """A smooth P(success), and reaches drawn from it."""
+    """A smooth P(success), and reaches drawn from it.
+
+    Attributes:
+        relief: 0: P(success) is 1/2 everywhere; 1: it is as different as can be.
+    """
+
+    relief: float = 1.0
 
     def grid(self) -> Vector:
         """The 45 x 21 distinct feature vectors."""
@@ -50,7 +57,8 @@ class World:
         best_y = 0.7 * goal_y - 0.2
         best_phi = 0.7 + 1.2 * y - 0.5 * goal_y
         miss = ((y - best_y) / 0.25) ** 2 + ((phi - best_phi) / 0.6) ** 2
-        return 0.2 + (0.95 - 0.5 * goal_x) * np.exp(-0.5 * miss)
+        p = 0.2 + (0.95 - 0.5 * goal_x) * np.exp(-0.5 * miss)
+        return 0.5 + self.relief * (p - 0.5)
 
     def library(self, environments: int, seed: int = 0, shared_luck: float = 0.0) -> Library:
         """Every pair once in each environment.
@@ -80,6 +88,12 @@ class World:
 @pytest.fixture(scope="session")
 def world() -> World:
     return World()
+
+
+@pytest.fixture(scope="session")
+def flat_world() -> World:
+    """With room for luck above and below P(success)."""
+    return World(relief=0.3)
 
 
 @pytest.fixture

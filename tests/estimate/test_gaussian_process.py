@@ -80,13 +80,13 @@ def test_the_spread_covers_the_true_probability_as_often_as_it_says(world) -> No
     assert np.mean(error < 0.5) < 0.7
 
 
-def test_luck_shared_within_environments_raises_the_noise(world) -> None:
-    alike = world.library(environments=8, shared_luck=0.5)
+def test_luck_shared_within_environments_raises_the_noise(flat_world) -> None:
+    alike = flat_world.library(environments=8, shared_luck=0.4)
     knowing = GaussianProcess().fit(alike.Z, alike.f, alike.environment)
     unknowing = GaussianProcess().fit(alike.Z, alike.f)
     assert knowing.hyperparameters.reach_variance > unknowing.hyperparameters.reach_variance
-    grid = world.grid()
-    truth = world.probability(grid)
+    grid = flat_world.grid()
+    truth = flat_world.probability(grid)
     error = {
         process: np.mean((process.predict(grid).probability - truth) ** 2)
         for process in (knowing, unknowing)

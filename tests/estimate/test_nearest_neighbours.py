@@ -89,8 +89,8 @@ def test_a_rough_surface_gets_a_smaller_bandwidth_than_a_flat_one() -> None:
     assert bandwidth["rough"] < 0.5 * bandwidth["flat"]
 
 
-def test_luck_shared_within_environments_widens_the_bandwidth(world) -> None:
-    alike = world.library(environments=8, shared_luck=0.5)
+def test_luck_shared_within_environments_widens_the_bandwidth(flat_world) -> None:
+    alike = flat_world.library(environments=8, shared_luck=0.4)
     knowing = NearestNeighbours().fit(alike.Z, alike.f, alike.environment)
     assert knowing.bandwidth > NearestNeighbours().fit(alike.Z, alike.f).bandwidth
 
