@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lic_drake.experience.workers import prepare_worker
 from lic_drake.intervals import wilson_interval
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.rollout import run_reach
@@ -62,7 +63,9 @@ def main() -> int:
         "| fixed cylinders | published, % | ours, % | 90 % interval | n | outcomes |",
         "|---|---|---|---|---|---|",
     ]
-    with ProcessPoolExecutor(args.workers, mp_context=get_context("forkserver")) as executor:
+    with ProcessPoolExecutor(
+        args.workers, mp_context=get_context("forkserver"), initializer=prepare_worker
+    ) as executor:
         for count, published in PUBLISHED.items():
             scenario = load_scenario("calibration-field", f"{{clutter: {{num_fixed: {count}}}}}")
             if args.set:

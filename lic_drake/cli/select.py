@@ -37,7 +37,8 @@ def add_parser(subparsers: Subparsers) -> None:
         action="append",
         default=[],
         metavar=("Y", "DEG"),
-        help="start (metres, degrees) of an attempt that failed; may be given several times (default: none)",
+        help="start (metres, degrees) of an attempt that failed; may be given several times"
+        " (default: none)",
     )
     parser.add_argument(
         "--library",

@@ -167,7 +167,7 @@ def _save_density(
     choices: list[tuple[str, Vector]],
 ) -> None:
     rows = PLANAR_LIC1.rows(columns)
-    estimator = make_estimator(method).fit(rows.Z, rows.f)
+    estimator = make_estimator(method).fit(rows.Z, rows.f, rows.environment)
     line = starts.line
     y = np.linspace(line.lower[1], line.upper[1], DENSITY_SHAPE[0])
     phi = np.linspace(line.lower[2], line.upper[2], DENSITY_SHAPE[1])

@@ -1,5 +1,6 @@
 """Trials of several strategies on the same unseen environments, resumable."""
 
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from scipy.stats import binomtest
 
 from lic_drake.evaluate.trial import planar_arm_of
 from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.experience.workers import prepare_worker
 from lic_drake.intervals import wilson_interval
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.rollout import run_reach
@@ -125,15 +127,26 @@ def simulate_requests(
     missing = list({r.key: r for r in requests if r.key not in records}.values())
     missing.sort(key=lambda request: request.environment)
     chunks = [missing[i : i + CHUNK] for i in range(0, len(missing), CHUNK)]
-    with ProcessPoolExecutor(workers, mp_context=get_context("forkserver")) as executor:
-        futures = {executor.submit(_run_chunk, chunk): chunk for chunk in chunks}
-        done = 0
-        for future in as_completed(futures):
+    executor = ProcessPoolExecutor(
+        workers, mp_context=get_context("forkserver"), initializer=prepare_worker
+    )
+    began = time.perf_counter()
+    done = successes = 0
+    try:
+        for future in as_completed([executor.submit(_run_chunk, chunk) for chunk in chunks]):
             rows = future.result()
             library.write_shard(f"reaches-{rows[0].key}", rows, scenario)
             records.update({row.key: row for row in rows})
             done += len(rows)
-            say(f"  {done}/{len(missing)} reaches simulated")
+            successes += sum(row.success for row in rows)
+            elapsed = time.perf_counter() - began
+            say(
+                f"  {done}/{len(missing)} reaches, {successes} at the goal,"
+                f" {60 * done / elapsed:.0f} a minute,"
+                f" {elapsed * (len(missing) - done) / done:.0f} s left; kept in {library.path}"
+            )
+    finally:
+        executor.shutdown(cancel_futures=True)
     return records
 
 

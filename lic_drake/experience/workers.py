@@ -12,7 +12,7 @@ from multiprocessing import get_context, parent_process
 def make_process_pool() -> ProcessPoolExecutor:
     """Returns an executor with one worker process, started from a fork server."""
     return ProcessPoolExecutor(
-        max_workers=1, mp_context=get_context("forkserver"), initializer=_prepare_worker
+        max_workers=1, mp_context=get_context("forkserver"), initializer=prepare_worker
     )
 
 
@@ -21,7 +21,7 @@ def ctrl_c_held_back() -> Iterator[None]:
     """Lets Ctrl-C take effect only after the block; processes that start in it never see it.
 
     An executor that is interrupted while it starts a worker would forget about the worker, and
-    a worker that is interrupted before `_prepare_worker` runs would print a traceback.
+    a worker that is interrupted before `prepare_worker` runs would print a traceback.
     """
     if threading.current_thread() is not threading.main_thread():
         yield  # Python interrupts the main thread only.
@@ -38,7 +38,7 @@ def ctrl_c_held_back() -> Iterator[None]:
             signal.raise_signal(signal.SIGINT)
 
 
-def _prepare_worker() -> None:
+def prepare_worker() -> None:
     """Makes a process a quiet worker: one thread, deaf to Ctrl-C, gone when its parent is."""
     # Ctrl-C reaches the whole process group; the parent lets the workers finish their reach.
     signal.signal(signal.SIGINT, signal.SIG_IGN)

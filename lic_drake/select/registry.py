@@ -66,5 +66,5 @@ def make_selector(
     if columns is None:
         raise RequestError(f"method {method!r} needs an experience library to learn from")
     rows = PLANAR_LIC1.rows(columns)
-    estimator = make_estimator(method).fit(rows.Z, rows.f)
+    estimator = make_estimator(method).fit(rows.Z, rows.f, rows.environment)
     return LicSelector(arm, estimator, PLANAR_LIC1, method=method)

@@ -1,0 +1,86 @@
+import csv
+import dataclasses
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.reach.request import ReachRecord
+from lic_drake.reach.scenario import load_scenario
+
+SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "cross_validate.py"
+BLANK = {str: "", int: 0, float: 0.0, bool: False, tuple[float, ...]: ()}
+
+
+@pytest.fixture
+def script() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("cross_validate", SCRIPT)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def library(world, tmp_path: Path) -> Path:
+    """Every seventh pair of the grid, in four environments."""
+    scenario = load_scenario("cylinder-clutter")
+    rows = world.library(environments=4)
+    records = []
+    for i in range(0, len(rows.f), 7):
+        goal_x, goal_y, start_y, start_phi = map(float, rows.Z[i])
+        values = {
+            "key": f"{i:016x}",
+            "scenario": scenario.digest,
+            "stream": "training",
+            "environment": int(rows.environment[i]),
+            "goal_x": goal_x,
+            "goal_y": goal_y,
+            "start_y": start_y,
+            "start_phi": start_phi,
+            "success": bool(rows.f[i]),
+            "outcome": "reached" if rows.f[i] else "stuck",
+        }
+        blank = {field.name: BLANK[field.type] for field in dataclasses.fields(ReachRecord)}
+        records.append(ReachRecord(**(blank | values)))
+    path = tmp_path / "library"
+    ExperienceLibrary(path).write_shard("all", records, scenario)
+    return path
+
+
+def _run(script: ModuleType, monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
+    monkeypatch.setattr(sys, "argv", ["cross_validate.py", *map(str, arguments)])
+    return script.main()
+
+
+def test_it_writes_scores_and_calibration_of_the_estimators(
+    script, library, tmp_path, monkeypatch
+) -> None:
+    names = ["knn", "sklearn KNN, K=100"]
+    out = tmp_path / "out"
+    arguments = (library, "--estimators", *names, "--folds", 2, "--out", out)
+    assert _run(script, monkeypatch, *arguments) == 0
+
+    with (out / "cross_validation.csv").open() as file:
+        scores = {row["estimator"]: row for row in csv.DictReader(file)}
+    assert list(scores) == ["constant rate", *names]
+    assert float(scores["constant rate"]["gain"]) == 0.0
+    assert float(scores["knn"]["gain"]) > 0.0
+    text = (out / "cross_validation.md").read_text()
+    assert "540 reaches of library in 4 environments, 2 folds" in text
+    assert f"| knn | {float(scores['knn']['log_loss']):.4f} |" in text
+
+    with (out / "calibration_curves.csv").open() as file:
+        counts = [int(row["count"]) for row in csv.DictReader(file) if row["estimator"] == "knn"]
+    assert np.sum(counts) == 540
+
+
+def test_a_missing_library_is_one_line_on_stderr(script, tmp_path, monkeypatch, capsys) -> None:
+    assert _run(script, monkeypatch, tmp_path / "none") == 2
+    error = capsys.readouterr().err
+    assert error.startswith("error: no experience library at")
+    assert error.count("\n") == 1

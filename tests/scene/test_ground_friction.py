@@ -1,0 +1,114 @@
+"""Movable objects: about 2 N dry friction on the ground, no spin; fixed ones do not move."""
+
+import numpy as np
+import pytest
+from worlds import box, cylinder, make_clutter, make_world
+
+from lic_drake.scene.scene import SceneConfig
+
+PARKED = np.deg2rad([-140.0, 100.0, 120.0])  # The arm folded at the base, far from the objects.
+TIME_STEPS = [0.0005, 0.0025, 0.005]
+AXIS_LIMIT = 0.25 * np.pi * 2.0
+"""Limit along x or y, N: then the mean resistance over all directions of motion is 2 N."""
+
+
+def velocity_after_push(
+    force: tuple[float, float], time_step: float = 0.0025, mass: float = 1.0, time: float = 0.5
+) -> np.ndarray:
+    world = make_world(
+        PARKED,
+        make_clutter(cylinder(0.6, 0.0, movable=True, mass=mass)),
+        SceneConfig(time_step_s=time_step),
+    )
+    world.push("object0", np.zeros(3), np.append(force, 0.0))
+    world.advance(time)
+    return world.object_velocities[0]
+
+
+@pytest.mark.parametrize("time_step", TIME_STEPS)
+@pytest.mark.parametrize("force", [0.5, 1.0, 1.5])
+def test_a_push_below_the_limit_only_makes_an_object_creep(force: float, time_step: float) -> None:
+    v = velocity_after_push((force, 0.0), time_step)
+    assert 0.0 < v[0] < 1e-3
+    assert v[1] == 0.0
+
+
+@pytest.mark.parametrize("time_step", TIME_STEPS)
+@pytest.mark.parametrize(("force", "mass"), [(2.0, 1.0), (-5.0, 1.0), (5.0, 0.5)])
+def test_a_push_above_the_limit_accelerates_by_newtons_law(
+    force: float, mass: float, time_step: float
+) -> None:
+    v = velocity_after_push((0.0, force), time_step, mass)
+    expected = np.sign(force) * (abs(force) - AXIS_LIMIT) / mass * 0.5
+    assert v[1] == pytest.approx(expected, rel=0.01)
+    assert v[0] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_an_object_in_motion_comes_to_rest_within_the_distance_of_dry_friction() -> None:
+    world = make_world(
+        PARKED, make_clutter(cylinder(0.6, 0.0, movable=True)), SceneConfig(time_step_s=0.0005)
+    )
+    plant = world.scene.plant
+    plant.SetVelocities(world.plant_context, world.scene.clutter, [-0.5, 0.0])
+    world.advance(1.0)
+    travelled = 0.6 - world.objects[0, 0]
+    assert travelled == pytest.approx(0.5 * 0.5**2 / AXIS_LIMIT, rel=0.01)
+    assert np.linalg.norm(world.object_velocities) < 1e-6
+
+
+@pytest.mark.parametrize("angle_deg", [0.0, 15.0, 30.0, 45.0, 70.0])
+def test_resistance_to_steady_motion_is_near_2_newtons_in_every_direction(angle_deg: float) -> None:
+    # A strong damper, in effect: the object is dragged at 5 cm/s against its friction.
+    direction = np.array([np.cos(np.deg2rad(angle_deg)), np.sin(np.deg2rad(angle_deg))])
+    world = make_world(
+        PARKED, make_clutter(cylinder(0.6, 0.0, movable=True)), SceneConfig(time_step_s=0.0025)
+    )
+    plant = world.scene.plant
+    plant.SetVelocities(world.plant_context, world.scene.clutter, 0.05 * direction)
+    before = plant.CalcKineticEnergy(world.plant_context)
+    step = 0.005
+    world.advance(step)
+    loss = before - plant.CalcKineticEnergy(world.plant_context)
+    resistance = loss / np.linalg.norm(world.objects[0] - [0.6, 0.0])
+    expected = AXIS_LIMIT * np.abs(direction).sum()
+    assert resistance == pytest.approx(expected, rel=0.1)
+    assert 1.5 < resistance < 2.4
+
+
+def test_an_object_pushed_off_its_centre_moves_but_never_spins() -> None:
+    world = make_world(
+        PARKED, make_clutter(box(0.6, 0.0, (0.05, 0.02, 0.2), 0.4, True)), SceneConfig()
+    )
+    world.push("object0", np.array([0.0, 0.01, 0.05]), np.array([6.0, 3.0, 0.0]))
+    world.advance(0.3)
+    X_WO = world.scene.plant.GetBodyByName("object0").EvalPoseInWorld(world.plant_context)
+    assert X_WO.translation()[0] > 0.7
+    np.testing.assert_array_equal(X_WO.rotation().matrix(), np.eye(3))
+    assert X_WO.translation()[2] == 0.0
+
+
+def test_objects_that_nobody_pushes_stay_where_they_are() -> None:
+    clutter = make_clutter(cylinder(0.6, 0.0, movable=True), cylinder(0.7, -0.3, movable=True))
+    world = make_world(PARKED, clutter, SceneConfig())
+    world.advance(2.0)
+    np.testing.assert_allclose(world.objects, [[0.6, 0.0], [0.7, -0.3]], atol=1e-12)
+
+
+def test_a_fixed_object_holds_a_movable_one_that_is_pressed_on_it() -> None:
+    clutter = make_clutter(cylinder(0.6, 0.0), cylinder(0.579, 0.0, movable=True))
+    world = make_world(PARKED, clutter, SceneConfig(time_step_s=0.0025))
+    world.push("object1", np.zeros(3), np.array([20.0, 0.0, 0.0]))
+    world.advance(1.0)
+    # 20 N less the ground's friction on a spring of 48 kN/m: 0.4 mm.
+    penetration = world.objects[0, 0] - (0.6 - 0.02)
+    assert 0.0 < penetration < 1e-3
+    assert penetration == pytest.approx(20.0 / 4.8e4, rel=0.1)
+
+
+def test_a_pushed_object_pushes_the_next_one() -> None:
+    clutter = make_clutter(cylinder(0.6, 0.0, movable=True), cylinder(0.579, 0.0, movable=True))
+    world = make_world(PARKED, clutter, SceneConfig(time_step_s=0.0025))
+    world.push("object1", np.zeros(3), np.array([9.0, 0.0, 0.0]))
+    world.advance(0.3)
+    expected = (9.0 - 2.0 * AXIS_LIMIT) / 2.0 * 0.3
+    np.testing.assert_allclose(world.object_velocities[:, 0], expected, rtol=0.03)
