@@ -20,8 +20,8 @@ class StopConfig:
     stuck_time_s: float = 4.0
     # Simulated seconds after which a reach fails.
     timeout_s: float = 30.0
-    # A reach fails when a taxel reads more than this, N (authors' hard stop).
-    force_limit_N: float = 100.0
+    # A reach fails when a taxel reads more than this, N (authors' monitor).
+    force_limit_N: float = 50.0
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
