@@ -33,15 +33,16 @@ HEADINGS = {
     "estimator": "estimator",
     "log_loss": "log loss",
     "gain": "gain over constant",
-    "gain_error": "standard error",
+    "gain_error": "its standard error",
     "brier": "Brier score",
     "selected": "selected start succeeds",
+    "selected_error": "its standard error",
     "seconds": "seconds in all",
 }
 
 
 def markdown(rows: list[dict[str, Any]], headings: dict[str, str]) -> str:
-    lines = [" | ".join(headings.values()), "|".join("---" for _ in headings)]
+    lines = [" | ".join(headings.values()), " | ".join("---" for _ in headings)]
     for row in rows:
         cells = [row[key] for key in headings]
         lines.append(" | ".join(f"{c:.4f}" if isinstance(c, float) else str(c) for c in cells))

@@ -10,10 +10,13 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.control.tactile_sensor import TactileSensor
+from lic_drake.control.taxels import planar_taxels
 from lic_drake.robots.planar import planar_arm
 from lic_drake.scene.scene import Scene, SceneConfig, add_scene
 
 ARM = planar_arm()
+LAYOUT = planar_taxels(ARM.skin)
 
 
 def make_clutter(*objects: ClutterInstance) -> ClutterInstance:
@@ -90,6 +93,11 @@ class World:
         plant = self.scene.plant
         return plant.GetVelocities(self.plant_context, self.scene.clutter).reshape(-1, 2)
 
+    @property
+    def taxel_force(self) -> np.ndarray:
+        """Readings of the sensor that `add_sensor` added, shape (num_taxels,)."""
+        return np.array(self.diagram.GetOutputPort("taxel_force").Eval(self.context))
+
     def set_equilibrium(self, q_d: np.ndarray) -> None:
         plant = self.scene.plant
         plant.get_desired_state_input_port(self.scene.arm).FixValue(
@@ -133,3 +141,12 @@ def make_world(
     )
     world.set_equilibrium(q)
     return world
+
+
+def add_sensor(builder: DiagramBuilder, scene: Scene) -> None:
+    """Adds the tactile sensor to a world: `make_world(..., extend=add_sensor)`."""
+    sensor = builder.AddNamedSystem("sensor", TactileSensor(ARM, LAYOUT, scene.skin_links))
+    plant = scene.plant
+    builder.Connect(plant.get_contact_results_output_port(), sensor.GetInputPort("contact_results"))
+    builder.Connect(plant.get_state_output_port(scene.arm), sensor.GetInputPort("arm_state"))
+    builder.ExportOutput(sensor.GetOutputPort("taxel_force"), "taxel_force")

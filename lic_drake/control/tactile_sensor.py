@@ -31,7 +31,8 @@ class TactileSensor(LeafSystem):
         super().__init__()
         self._arm = arm
         self._layout = layout
-        self._skin_links = skin_links
+        # Numbers: a GeometryId that a plant has returned keeps the whole diagram alive for ever.
+        self._skin_links = {geometry.get_value(): link for geometry, link in skin_links.items()}
         self._contact_results = self.DeclareAbstractInputPort(
             "contact_results", Value(ContactResults())
         )
@@ -49,7 +50,7 @@ class TactileSensor(LeafSystem):
 
     def _calc_taxel_force(self, context: Context, output: BasicVector) -> None:
         results = cast(ContactResults, self._contact_results.Eval(context))
-        patches = read_patches(results, self._skin_links.get)
+        patches = read_patches(results, lambda geometry: self._skin_links.get(geometry.get_value()))
         if not patches:
             output.SetFromVector(np.zeros(self._layout.num_taxels))
             return

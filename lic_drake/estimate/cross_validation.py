@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.estimate.checks import Vector
 from lic_drake.estimate.estimator import Predictor
@@ -91,7 +90,8 @@ class Scores:
         gain: Mean over environments of the log loss saved against the constant rate.
         gain_error: Standard error of that mean.
         brier: See `brier_score`; smaller is better.
-        selected: See `selection_success`; larger is better.
+        selected: Mean over environments of `selection_success`; larger is better.
+        selected_error: Standard error of that mean.
     """
 
     log_loss: float
@@ -99,17 +99,20 @@ class Scores:
     gain_error: float
     brier: float
     selected: float
+    selected_error: float
 
 
 def score(held_out: HeldOutPredictions, situation: slice) -> Scores:
     """Returns the scores of predictions; `situation` is the part of z that is given."""
     gain = held_out.gain_by_environment()
+    selected = selection_success(held_out.probability, held_out.rows, situation)
     return Scores(
         log_loss=log_loss(held_out.probability, held_out.rows.f),
         gain=float(gain.mean()),
-        gain_error=float(gain.std(ddof=1) / np.sqrt(len(gain))),
+        gain_error=_standard_error(gain),
         brier=brier_score(held_out.probability, held_out.rows.f),
-        selected=selection_success(held_out.probability, held_out.rows, situation),
+        selected=float(selected.mean()),
+        selected_error=_standard_error(selected),
     )
 
 
@@ -147,7 +150,7 @@ def calibration_curve(
     return curve
 
 
-def selection_success(score: Vector, rows: ExperienceRows, situation: slice) -> float:
+def selection_success(score: Vector, rows: ExperienceRows, situation: slice) -> Vector:
     """Returns the share of successes where each choice goes to the reach with the best score.
 
     A choice is between all reaches of the same environment and situation, so it takes a library
@@ -157,17 +160,26 @@ def selection_success(score: Vector, rows: ExperienceRows, situation: slice) -> 
         score: Prediction for each reach, shape (n,).
         rows: The reaches.
         situation: The part of z that is given.
+
+    Returns:
+        One share per environment, in rising order of its number.
     """
     given = np.column_stack([rows.environment, rows.Z[:, situation]])
-    _, choice = np.unique(given, axis=0, return_inverse=True)
-    best = np.full(choice.max() + 1, -np.inf)
+    choices, choice = np.unique(given, axis=0, return_inverse=True)
+    best = np.full(len(choices), -np.inf)
     np.maximum.at(best, choice, score)
     chosen = score == best[choice]
-    success: NDArray[np.float64] = np.bincount(choice[chosen], rows.f[chosen])
-    return float(np.mean(success / np.bincount(choice[chosen])))
+    success = np.bincount(choice[chosen], rows.f[chosen]) / np.bincount(choice[chosen])
+    _, environment = np.unique(choices[:, 0], return_inverse=True)
+    share: Vector = np.bincount(environment, success) / np.bincount(environment)
+    return share
 
 
 def _log_losses(probability: Vector, f: Vector) -> Vector:
     p = np.clip(probability, MIN_PROBABILITY, 1.0 - MIN_PROBABILITY)
     losses: Vector = -np.where(f > 0.5, np.log(p), np.log1p(-p))
     return losses
+
+
+def _standard_error(values: Vector) -> float:
+    return float(values.std(ddof=1) / np.sqrt(len(values)))

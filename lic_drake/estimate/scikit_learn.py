@@ -67,13 +67,11 @@ def _neighbours(k: int) -> Predictor:
 def _gaussian_process() -> Predictor:
     def make(num_features: int, noise_variance: Vector) -> Any:
         from sklearn.gaussian_process import GaussianProcessRegressor
-        from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
+        from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
         # The first constant is the prior variance of the unknown mean rate.
-        kernel = (
-            ConstantKernel(1.0, "fixed")
-            + ConstantKernel(0.05, (1e-4, 4.0)) * Matern(np.ones(num_features), nu=0.5)
-            + WhiteKernel(0.005, (1e-6, 0.25))
+        kernel = ConstantKernel(1.0, "fixed") + ConstantKernel(0.05, (1e-4, 4.0)) * Matern(
+            np.ones(num_features), nu=0.5
         )
         return GaussianProcessRegressor(kernel, alpha=noise_variance)
 

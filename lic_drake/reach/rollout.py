@@ -1,5 +1,6 @@
 """`run_reach`: simulates one request and returns its record."""
 
+import gc
 import math
 import time
 from dataclasses import replace
@@ -84,8 +85,12 @@ def simulate(
     """
     diagram, scene = reach_diagram.diagram, reach_diagram.scene
     arm = scenario.arm()
+    period_s = scenario.mpc.period_s
+    # Drake's own arithmetic for periodic events: no rounding error decides whether a sample comes
+    # before or after the events of its instant.
+    first = round(begin_s / period_s)
     context = reach_diagram.make_context(q0, p_WG)
-    context.SetTime(begin_s)
+    context.SetTime(first * period_s)
     query = cast(
         QueryObject,
         scene.scene_graph.get_query_output_port().Eval(
@@ -99,7 +104,7 @@ def simulate(
     clutter_state = diagram.GetOutputPort("clutter_state")
     taxel_force = diagram.GetOutputPort("taxel_force")
     num_movable = scene.plant.num_positions(scene.clutter) // 2
-    monitor = StopMonitor(scenario.stop, p_WG, scenario.mpc.period_s)
+    monitor = StopMonitor(scenario.stop, p_WG, period_s)
     trace = ReachTrace()
     simulator = Simulator(diagram, context)
     if scenario.scene.time_step_s == 0.0:
@@ -112,15 +117,16 @@ def simulate(
         try:
             if step == 0:
                 simulator.Initialize()
-            simulator.AdvanceTo(begin_s + step * scenario.mpc.period_s)
-        except RuntimeError as error:
+            simulator.AdvanceTo((first + step) * period_s)
+            q = np.array(arm_state.Eval(context))[: len(q0)]
+            # Reading the taxels solves the contacts of this instant, which can fail, too.
+            forces = np.asarray(taxel_force.Eval(context))
+        except (ArithmeticError, RuntimeError, ValueError) as error:
             return "diverged", trace, " ".join(str(error).split())[:200]
-        q = np.array(arm_state.Eval(context))[: len(q0)]
         if not np.all(np.isfinite(q)):
             return "diverged", trace, "joint angles are not finite"
         p_WE = arm.tip_position(q)
-        forces = np.asarray(taxel_force.Eval(context))
-        time_s = context.get_time() - begin_s
+        time_s = step * period_s
         trace.append(time_s, q, p_WE, forces)
         if num_movable:
             trace.follow(np.asarray(clutter_state.Eval(context))[: 2 * num_movable])
@@ -138,6 +144,8 @@ def environment_of(request: ReachRequest) -> Environment:
     key = (request.scenario.digest, request.stream, request.environment)
     if key not in _recent:
         _recent.clear()
+        # Diagrams with Python systems are reference cycles: only the collector frees them.
+        gc.collect()
         scenario = request.scenario
         instance = scenario.sample_instance(request.stream, request.environment)
         _recent[key] = Environment(scenario, instance)

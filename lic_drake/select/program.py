@@ -30,15 +30,15 @@ class StartProgram:
         self._estimator = estimator
         self._features = features
         self._p_WG = np.zeros(3)
-        self._program = MathematicalProgram()
-        self.x0 = self._program.NewContinuousVariables(3, "x0")
-        self.q = self._program.NewContinuousVariables(len(kinematics.q_min), "q")
-        self._program.AddBoundingBoxConstraint(kinematics.q_min, kinematics.q_max, self.q)
-        self._line = self._program.AddBoundingBoxConstraint(np.zeros(3), np.zeros(3), self.x0)
-        self._program.AddConstraint(
+        self.program = MathematicalProgram()
+        self.x0 = self.program.NewContinuousVariables(3, "x0")
+        self.q = self.program.NewContinuousVariables(len(kinematics.q_min), "q")
+        self.program.AddBoundingBoxConstraint(kinematics.q_min, kinematics.q_max, self.q)
+        self._line = self.program.AddBoundingBoxConstraint(np.zeros(3), np.zeros(3), self.x0)
+        self.program.AddConstraint(
             self._hand_error, np.zeros(3), np.zeros(3), np.concatenate([self.x0, self.q])
         )
-        self._program.AddCost(self._cost, self.x0)
+        self.program.AddCost(self._cost, self.x0)
         self._options = SolverOptions()
         # Kinks of the L1 kernel can make the solver crawl; the result is checked anyway.
         self._options.SetOption(NloptSolver.id(), NloptSolver.MaxEvalName(), 60)
@@ -60,7 +60,7 @@ class StartProgram:
         self._p_WG = p_WG
         self._line.evaluator().set_bounds(lower, upper)
         guess = np.concatenate([x0_guess, q_guess])
-        result = self._solver.Solve(self._program, guess, self._options)
+        result = self._solver.Solve(self.program, guess, self._options)
         return np.asarray(result.GetSolution(self.x0))
 
     def _cost(self, x0: NDArray[np.generic]) -> object:

@@ -27,11 +27,11 @@ def script() -> ModuleType:
 
 @pytest.fixture
 def library(world, tmp_path: Path) -> Path:
-    """Every seventh pair of the grid, in four environments."""
+    """Every third pair of the grid, in six environments."""
     scenario = load_scenario("cylinder-clutter")
-    rows = world.library(environments=4)
+    rows = world.library(environments=6)
     records = []
-    for i in range(0, len(rows.f), 7):
+    for i in range(0, len(rows.f), 3):
         goal_x, goal_y, start_y, start_phi = map(float, rows.Z[i])
         values = {
             "key": f"{i:016x}",
@@ -71,12 +71,12 @@ def test_it_writes_scores_and_calibration_of_the_estimators(
     assert float(scores["constant rate"]["gain"]) == 0.0
     assert float(scores["knn"]["gain"]) > 0.0
     text = (out / "cross_validation.md").read_text()
-    assert "540 reaches of library in 4 environments, 2 folds" in text
+    assert "1890 reaches of library in 6 environments, 2 folds" in text
     assert f"| knn | {float(scores['knn']['log_loss']):.4f} |" in text
 
     with (out / "calibration_curves.csv").open() as file:
         counts = [int(row["count"]) for row in csv.DictReader(file) if row["estimator"] == "knn"]
-    assert np.sum(counts) == 540
+    assert np.sum(counts) == 1890
 
 
 def test_a_missing_library_is_one_line_on_stderr(script, tmp_path, monkeypatch, capsys) -> None:

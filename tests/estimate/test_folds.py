@@ -37,3 +37,7 @@ def test_without_environments_single_rows_are_spread_over_the_folds() -> None:
 def test_environments_of_another_length_than_the_rows_are_refused() -> None:
     with pytest.raises(EstimateError, match=r"each of 3 rows, got \(2,\)"):
         selection_folds([0, 1], 3)
+
+
+def test_the_order_of_a_grid_does_not_decide_the_folds() -> None:
+    assert set(selection_folds(None, 100)[::5]) == set(range(5))

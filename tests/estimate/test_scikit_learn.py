@@ -16,7 +16,6 @@ def test_the_neighbours_give_what_the_classifier_gives(scattered) -> None:
     )
 
 
-@pytest.mark.filterwarnings("ignore:The optimal value found")
 def test_the_process_averages_and_smooths(world) -> None:
     library = world.library(environments=8)
     some = np.isin(library.Z[:, 0], [0.4, 0.6]) & (library.Z[:, 1] >= 0.0)

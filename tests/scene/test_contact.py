@@ -1,12 +1,8 @@
 import numpy as np
 import pytest
 from pydrake.geometry import TriangleSurfaceMesh, VolumeMesh
-from pydrake.multibody.plant import (
-    CalcContactFrictionFromSurfaceProperties,
-    ContactResults,
-    CoulombFriction,
-)
-from worlds import ARM, box, cylinder, make_clutter, make_world
+from pydrake.multibody.plant import CalcContactFrictionFromSurfaceProperties, ContactResults
+from worlds import ARM, World, box, cylinder, make_clutter, make_world
 
 from lic_drake.scene.contact import ContactConfig, object_properties, skin_properties
 from lic_drake.scene.scene import SceneConfig
@@ -14,21 +10,19 @@ from lic_drake.scene.scene import SceneConfig
 BENT = np.deg2rad([-30.0, 60.0, 50.0])
 
 
-def friction(properties: object) -> CoulombFriction:
-    return properties.GetProperty("material", "coulomb_friction")  # type: ignore[attr-defined]
-
-
-def contact_results(world: object) -> ContactResults:
-    plant = world.scene.plant  # type: ignore[attr-defined]
-    return plant.get_contact_results_output_port().Eval(world.plant_context)  # type: ignore[attr-defined]
+def contact_results(world: World) -> ContactResults:
+    return world.scene.plant.get_contact_results_output_port().Eval(world.plant_context)
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.2, 0.5])
 def test_friction_of_arm_on_object_is_twice_that_of_object_on_object(mu: float) -> None:
     config = ContactConfig(object_friction=mu)
-    skin, item = friction(skin_properties(config)), friction(object_properties(config))
-    for pair, expected in (((item, item), mu), ((skin, item), 2.0 * mu)):
-        combined = CalcContactFrictionFromSurfaceProperties(*pair)
+    skin, item = skin_properties(config), object_properties(config)
+    for first, second, expected in ((item, item, mu), (skin, item, 2.0 * mu)):
+        combined = CalcContactFrictionFromSurfaceProperties(
+            first.GetProperty("material", "coulomb_friction"),
+            second.GetProperty("material", "coulomb_friction"),
+        )
         assert combined.static_friction() == pytest.approx(expected, abs=1e-6)
         assert combined.dynamic_friction() == pytest.approx(expected, abs=1e-6)
 

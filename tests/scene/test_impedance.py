@@ -34,20 +34,19 @@ def mass_matrix_and_bias(q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.n
     return M, bias
 
 
-@pytest.mark.parametrize("time_step", TIME_STEPS)
-@pytest.mark.parametrize("force", [(3.0, -2.0), (-4.0, 1.0)])
+@pytest.mark.parametrize(("force", "time_step"), [((3.0, -2.0), 0.001), ((-4.0, 1.0), 0.005)])
 def test_a_force_on_the_tip_deflects_the_arm_by_the_joint_compliance(
     force: tuple[float, float], time_step: float
 ) -> None:
     world = make_world(Q0, make_clutter(), SceneConfig(time_step_s=time_step))
     f_E_W = np.append(force, 0.0)
     world.push("link3", np.array([0.0, -0.288, 0.0]), f_E_W)
-    world.advance(12.0)
+    world.advance(8.0)
     expected = ARM.tip_jacobian(world.q).T @ f_E_W / K
     np.testing.assert_allclose(world.q - Q0, expected, atol=1e-6)
     assert np.max(np.abs(expected)) > 0.02
     world.push("link3", np.zeros(3), np.zeros(3))
-    world.advance(12.0)
+    world.advance(8.0)
     np.testing.assert_allclose(world.q, Q0, atol=1e-6)
 
 
@@ -63,9 +62,19 @@ def test_the_step_response_agrees_with_an_integration_of_the_equations_of_motion
         return np.append(v, np.linalg.solve(M, K * (q_d - q) - D * v - bias))
 
     times = np.array([0.02, 0.1, 0.3, 1.0, 3.0])
-    reference = solve_ivp(
-        derivative, (0.0, 3.0), np.append(Q0, np.zeros(3)), "LSODA", times, rtol=1e-9, atol=1e-11
-    ).y[:3].T
+    reference = (
+        solve_ivp(
+            derivative,
+            (0.0, 3.0),
+            np.append(Q0, np.zeros(3)),
+            "LSODA",
+            times,
+            rtol=1e-9,
+            atol=1e-11,
+        )
+        .y[:3]
+        .T
+    )
     world = make_world(Q0, make_clutter(), SceneConfig(time_step_s=time_step))
     world.set_equilibrium(q_d)
     for time, expected in zip(times, reference, strict=True):
@@ -74,8 +83,7 @@ def test_the_step_response_agrees_with_an_integration_of_the_equations_of_motion
         np.testing.assert_allclose(world.q, expected, atol=0.2 * time_step)
 
 
-def test_the_closed_loop_has_the_poles_of_the_linearised_arm() -> None:
-    # Heavily damped: the slowest decay rates are about 1.9 to 2.2 1/s.
+def test_a_small_disturbance_decays_with_the_slowest_pole_of_the_linearised_arm() -> None:
     q = np.deg2rad([4.0, 70.0, 106.0])
     M, _ = mass_matrix_and_bias(q, np.zeros(3))
     A = np.block(
@@ -84,6 +92,7 @@ def test_the_closed_loop_has_the_poles_of_the_linearised_arm() -> None:
             [-np.linalg.solve(M, np.diag(K)), -np.linalg.solve(M, np.diag(D))],
         ]
     )
+    # Heavily damped: a reach follows its equilibrium angles half a second late.
     poles = np.sort(np.linalg.eigvals(A).real)
     np.testing.assert_allclose(poles[-3:], [-2.2, -2.0, -1.9], atol=0.06)
     world = make_world(q, make_clutter(), SceneConfig(time_step_s=0.001))

@@ -1,0 +1,246 @@
+"""The tactile sensor in simulated contact, against the forces that were applied."""
+
+import numpy as np
+import pytest
+from pydrake.geometry import (
+    AddCompliantHydroelasticProperties,
+    AddContactMaterial,
+    AddRigidHydroelasticProperties,
+    Cylinder,
+    GeometryId,
+    ProximityProperties,
+    Sphere,
+)
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import (
+    AddMultibodyPlant,
+    ContactResults,
+    CoulombFriction,
+    MultibodyPlantConfig,
+)
+from pydrake.multibody.tree import SpatialInertia, UnitInertia
+from pydrake.systems.framework import DiagramBuilder
+from worlds import ARM, LAYOUT, World, add_sensor, box, cylinder, make_clutter, make_world
+
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.control.tactile_sensor import read_patches
+from lic_drake.scene import scene as scene_module
+from lic_drake.scene.contact import ContactConfig, object_properties
+from lic_drake.scene.scene import SceneConfig
+
+BENT = np.deg2rad([-30.0, 60.0, 50.0])
+
+
+def press(
+    world: World, body: str, link: int, normal_L: np.ndarray, force: float, duration: float = 3.0
+) -> None:
+    """Presses an object on a link with a force that follows the link's normal as it yields."""
+    for _ in range(round(duration / 0.1)):
+        normal = ARM.link_poses(world.q)[0][link] @ normal_L
+        world.push(body, np.zeros(3), -force * normal)
+        world.advance(0.1)
+
+
+def object_at(taxel: int, clearance: float = 1e-4, along: float = 0.0) -> ClutterInstance:
+    """A movable cylinder just off a taxel, `along` metres further in the row."""
+    R_RL, p_RL = ARM.link_poses(BENT)
+    link = LAYOUT.link[taxel]
+    p_LO = LAYOUT.p_LT[taxel] + (0.01 + clearance) * LAYOUT.n_L[taxel] + [0.0, along, 0.0]
+    return cylinder(*(p_RL[link] + R_RL[link] @ p_LO)[:2], movable=True)
+
+
+def contact(
+    modulus: float = 1e8, skin_mesh: float = 0.005, object_mesh: float = 0.004
+) -> SceneConfig:
+    """Hardly any ground friction, so that what is applied to an object presses on the arm."""
+    return SceneConfig(
+        time_step_s=0.0025,
+        ground_friction_N=1e-3,
+        contact=ContactConfig(
+            skin_modulus_Pa=modulus, skin_mesh_m=skin_mesh, object_mesh_m=object_mesh
+        ),
+    )
+
+
+def joint_torques(world: World, forces: np.ndarray) -> np.ndarray:
+    """What the taxels' forces do to the joints, through the taxels' Jacobians."""
+    loaded = np.flatnonzero(forces)
+    links = LAYOUT.link[loaded]
+    R_RL, p_RL = ARM.link_poses(world.q)
+    p_RT = p_RL[links] + np.einsum("ijk,ik->ij", R_RL[links], LAYOUT.p_LT[loaded])
+    normals = np.einsum("ijk,ik->ij", R_RL[links], LAYOUT.n_L[loaded])
+    jacobians = ARM.point_jacobians(world.q, links, p_RT)
+    return -np.einsum("i,ij,ijk->k", forces[loaded], normals, jacobians)
+
+
+# Sides of all links and both caps of the last one: link 3's first side is taxels 124..150, the
+# other 151..177, the caps 178..187.
+@pytest.mark.parametrize("taxel", [25, 58, 101, 126, 144, 171, 180])
+@pytest.mark.parametrize("force", [1.0, 5.0])
+def test_a_pressed_cylinder_reads_its_force_on_its_taxel_and_bends_the_arm_by_statics(
+    taxel: int, force: float
+) -> None:
+    world = make_world(BENT, make_clutter(object_at(taxel)), contact(), add_sensor)
+    press(world, "object0", LAYOUT.link[taxel], LAYOUT.n_L[taxel], force)
+    forces = world.taxel_force
+    assert np.flatnonzero(forces).tolist() == [taxel]
+    assert forces.sum() == pytest.approx(force, rel=0.01)
+    # The contact may be 5 mm off its taxel: 1 mNm a newton.
+    torques = joint_torques(world, forces)
+    deflection = ARM.stiffness * (world.q - BENT)
+    np.testing.assert_allclose(deflection, torques, rtol=0.02, atol=2e-3 * force)
+
+
+@pytest.mark.parametrize(
+    ("skin_mesh", "object_mesh"), [(0.01, 0.01), (0.005, 0.004), (0.01, 0.004), (0.003, 0.002)]
+)
+@pytest.mark.parametrize("modulus", [1e7, 1e8])
+def test_the_reading_depends_neither_on_the_contact_meshes_nor_on_the_skins_modulus(
+    modulus: float, skin_mesh: float, object_mesh: float
+) -> None:
+    clutter = make_clutter(object_at(139, along=0.0023))
+    world = make_world(BENT, clutter, contact(modulus, skin_mesh, object_mesh), add_sensor)
+    press(world, "object0", 2, LAYOUT.n_L[139], 3.0, 2.0)
+    assert world.taxel_force.sum() == pytest.approx(3.0, rel=0.01)
+    assert set(np.flatnonzero(world.taxel_force)) <= {138, 139}
+
+
+def test_two_objects_on_two_links_light_up_their_taxels_and_their_torques_add_up() -> None:
+    clutter = make_clutter(object_at(58), object_at(171))
+    world = make_world(BENT, clutter, contact(), add_sensor)
+    plant = world.scene.plant
+    for _ in range(30):
+        # `push` applies one force: hold the other object by a joint force on its slides.
+        normal = ARM.link_poses(world.q)[0][1] @ LAYOUT.n_L[58]
+        other = ARM.link_poses(world.q)[0][2] @ LAYOUT.n_L[171]
+        world.push("object0", np.zeros(3), -4.0 * normal)
+        plant.get_applied_generalized_force_input_port().FixValue(
+            world.plant_context, np.concatenate([np.zeros(5), -2.0 * other[:2]])
+        )
+        world.advance(0.1)
+    forces = world.taxel_force
+    assert np.flatnonzero(forces).tolist() == [58, 171]
+    np.testing.assert_allclose(forces[[58, 171]], [4.0, 2.0], rtol=0.01)
+    deflection = ARM.stiffness * (world.q - BENT)
+    np.testing.assert_allclose(deflection, joint_torques(world, forces), rtol=0.03, atol=5e-3)
+
+
+def test_a_wall_along_the_arm_loads_many_taxels_with_its_whole_force() -> None:
+    R_RL, p_RL = ARM.link_poses(BENT)
+    centre = p_RL[2] + R_RL[2] @ [0.0151 + 0.01, -0.14, 0.0]
+    yaw = float(np.arctan2(R_RL[2, 1, 1], R_RL[2, 0, 1]))
+    wall = box(*centre[:2], (0.16, 0.02, 0.1), yaw, movable=True)
+    world = make_world(BENT, make_clutter(wall), contact(1e5), add_sensor)
+    # The wall cannot turn with the arm: only a soft skin and a small force keep it flat.
+    press(world, "object0", 2, np.array([1.0, 0.0, 0.0]), 0.5)
+    forces = world.taxel_force
+    loaded = np.flatnonzero(forces)
+    assert forces.sum() == pytest.approx(0.5, rel=0.02)
+    assert len(loaded) >= 3
+    assert set(LAYOUT.link[loaded]) == {2}
+    np.testing.assert_array_equal(LAYOUT.n_L[loaded, 0], 1.0)
+
+
+@pytest.mark.parametrize("turn_deg", [10.0, 30.0, 45.0])
+def test_the_corner_of_a_box_reads_its_force_once_and_near_the_corner(turn_deg: float) -> None:
+    R_RL, p_RL = ARM.link_poses(BENT)
+    normal, along = R_RL[2, :, 0], -R_RL[2, :, 1]
+    corner = p_RL[2] + 0.1 * along + 0.0151 * normal
+    half = 0.02
+    yaw = float(np.arctan2(normal[1], normal[0]) + np.deg2rad(turn_deg))
+    u, w = np.array([[np.cos(yaw), np.sin(yaw), 0.0], [-np.sin(yaw), np.cos(yaw), 0.0]])
+    p_WO = corner + half * (u - w)
+    square = box(*p_WO[:2], (2.0 * half, 2.0 * half, 0.2), yaw, movable=True)
+    world = make_world(BENT, make_clutter(square), contact(), add_sensor)
+    press(world, "object0", 2, np.array([1.0, 0.0, 0.0]), 3.0, 3.0)
+    forces = world.taxel_force
+    assert forces.sum() == pytest.approx(3.0, rel=0.02)
+    loaded = np.flatnonzero(forces)
+    np.testing.assert_allclose(LAYOUT.p_LT[loaded, 1], -0.1, atol=0.011)
+
+
+def test_point_contacts_are_read_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
+    # A rigid skin: Drake then falls back to point contact without a word.
+    monkeypatch.setattr(scene_module, "skin_properties", object_properties)
+    world = make_world(BENT, make_clutter(object_at(144)), contact(), add_sensor)
+    press(world, "object0", 2, LAYOUT.n_L[144], 4.0)
+    results = world.scene.plant.get_contact_results_output_port().Eval(world.plant_context)
+    assert (results.num_hydroelastic_contacts(), results.num_point_pair_contacts()) == (0, 1)
+    forces = world.taxel_force
+    assert np.flatnonzero(forces).tolist() == [144]
+    assert forces[144] == pytest.approx(4.0, rel=0.01)
+    deflection = ARM.stiffness * (world.q - BENT)
+    np.testing.assert_allclose(deflection, joint_torques(world, forces), rtol=0.02, atol=0.01)
+
+
+def test_contacts_among_objects_and_no_contact_at_all_read_zero() -> None:
+    pair = make_clutter(cylinder(0.6, 0.0), cylinder(0.579, 0.0, movable=True))
+    world = make_world(BENT, pair, contact(), add_sensor)
+    np.testing.assert_array_equal(world.taxel_force, 0.0)
+    world.push("object1", np.zeros(3), np.array([5.0, 0.0, 0.0]))
+    world.advance(0.2)
+    results = world.scene.plant.get_contact_results_output_port().Eval(world.plant_context)
+    assert results.num_point_pair_contacts() == 1
+    np.testing.assert_array_equal(world.taxel_force, 0.0)
+
+
+def pressed_pair(first_soft: bool, second_soft: bool) -> tuple[ContactResults, list[GeometryId]]:
+    """A body below and one above it, overlapping by 5 mm; the lower one is registered first."""
+    builder = DiagramBuilder()
+    config = MultibodyPlantConfig(time_step=1e-3, use_sampled_output_ports=False)
+    plant, _ = AddMultibodyPlant(config, builder)
+    geometries = []
+    for name, shape, soft in (
+        ("below", Cylinder(0.05, 0.1), first_soft),
+        ("above", Sphere(0.05), second_soft),
+    ):
+        body = plant.AddRigidBody(
+            name, SpatialInertia(1.0, np.zeros(3), UnitInertia.SolidSphere(0.05))
+        )
+        properties = ProximityProperties()
+        AddContactMaterial(
+            dissipation=0.0,
+            point_stiffness=1e4,
+            friction=CoulombFriction(0.0, 0.0),
+            properties=properties,
+        )
+        if soft:
+            AddCompliantHydroelasticProperties(0.02, 1e6, properties)
+        else:
+            AddRigidHydroelasticProperties(0.02, properties)
+        geometries.append(
+            plant.RegisterCollisionGeometry(body, RigidTransform(), shape, name, properties)
+        )
+    plant.Finalize()
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    plant_context = plant.GetMyMutableContextFromRoot(context)
+    plant.SetFreeBodyPose(
+        plant_context, plant.GetBodyByName("above"), RigidTransform(p=[0.0, 0.0, 0.095])
+    )
+    return plant.get_contact_results_output_port().Eval(plant_context), geometries
+
+
+@pytest.mark.parametrize(
+    ("first_soft", "second_soft"), [(True, False), (False, True), (True, True), (False, False)]
+)
+def test_the_sign_of_a_force_does_not_depend_on_which_body_drake_names_first(
+    first_soft: bool, second_soft: bool
+) -> None:
+    results, (below, above) = pressed_pair(first_soft, second_soft)
+    assert results.num_hydroelastic_contacts() == int(first_soft or second_soft)
+    (of_below,) = read_patches(results, {below: 4}.get)
+    (of_above,) = read_patches(results, {above: 7}.get)
+    assert (of_below.link, of_above.link) == (4, 7)
+    # The lower body's force on the upper one points up.
+    assert of_below.f_R.sum(axis=0)[2] > 1.0
+    np.testing.assert_allclose(of_above.f_R, -of_below.f_R, atol=1e-9)
+    np.testing.assert_allclose(of_below.p_RQ[:, 2], 0.0475, atol=3e-3)
+    if results.num_hydroelastic_contacts():
+        wrench = results.hydroelastic_contact_info(0).F_Ac_W().translational()
+    else:
+        wrench = results.point_pair_contact_info(0).contact_force()
+    # Drake's force is that of the end of the step, when the bodies have begun to part.
+    sensed = np.linalg.norm(of_below.f_R.sum(axis=0))
+    assert sensed == pytest.approx(np.linalg.norm(wrench), rel=0.1)
+    assert read_patches(results, {}.get) == []

@@ -1,0 +1,100 @@
+import numpy as np
+import pytest
+from pydrake.geometry import Box, Cylinder, Role, Sphere
+from pydrake.systems.analysis import ApplySimulatorConfig, SimulatorConfig
+from worlds import ARM, box, cylinder, make_clutter, make_world
+
+from lic_drake.scene.scene import SceneConfig, make_shape
+
+PARKED = np.deg2rad([-140.0, 100.0, 120.0])
+CLUTTER = make_clutter(
+    cylinder(0.6, 0.1, movable=True, mass=0.5),
+    box(0.7, -0.2, (0.4, 0.02, 0.2), yaw=0.7),
+    box(0.5, 0.3, (0.1, 0.03, 0.2), yaw=-0.4, movable=True),
+    cylinder(0.8, 0.0, radius=0.02),
+)
+
+
+def test_objects_stand_where_the_instance_says_with_its_shapes_and_yaw() -> None:
+    world = make_world(PARKED, CLUTTER, SceneConfig())
+    scene_graph = world.scene.scene_graph
+    inspector = scene_graph.model_inspector()
+    query = scene_graph.get_query_output_port().Eval(
+        scene_graph.GetMyContextFromRoot(world.context)
+    )
+    for role, suffix in ((Role.kProximity, "collision"), (Role.kIllustration, "visual")):
+        geometries = {
+            inspector.GetName(geometry): geometry
+            for geometry in inspector.GetAllGeometryIds(role)
+            if "object" in inspector.GetName(geometry)
+        }
+        assert len(geometries) == CLUTTER.num_objects
+        for name, geometry in geometries.items():
+            i = int(name.split("object")[-1].split("_")[0])
+            assert name.endswith(suffix)
+            X_WG = query.GetPoseInWorld(geometry)
+            np.testing.assert_allclose(X_WG.translation(), CLUTTER.p_WO[i], atol=1e-12)
+            yaw = CLUTTER.yaw[i]
+            np.testing.assert_allclose(
+                X_WG.rotation().matrix()[:, 0], [np.cos(yaw), np.sin(yaw), 0.0], atol=1e-12
+            )
+            shape = inspector.GetShape(geometry)
+            if CLUTTER.shape[i] == "cylinder":
+                assert isinstance(shape, Cylinder)
+                assert (shape.radius(), shape.length()) == tuple(CLUTTER.size[i, :2])
+            else:
+                assert isinstance(shape, Box)
+                np.testing.assert_array_equal(shape.size(), CLUTTER.size[i])
+
+
+def test_only_movable_objects_have_a_body_with_their_mass() -> None:
+    plant = make_world(PARKED, CLUTTER, SceneConfig()).scene.plant
+    assert plant.num_positions() == 3 + 2 * 2
+    assert plant.GetBodyByName("object0").default_mass() == 0.5
+    assert plant.GetBodyByName("object2").default_mass() == 1.0
+    assert not plant.HasBodyNamed("object1")
+    assert not plant.HasBodyNamed("object3")
+
+
+def test_movable_objects_come_in_their_order_in_the_clutter_state() -> None:
+    world = make_world(PARKED, CLUTTER, SceneConfig())
+    np.testing.assert_array_equal(world.objects, CLUTTER.p_WO[CLUTTER.movable, :2])
+
+
+def test_nothing_moves_by_itself_in_the_horizontal_plane() -> None:
+    world = make_world(PARKED, CLUTTER, SceneConfig())
+    np.testing.assert_array_equal(world.scene.plant.gravity_field().gravity_vector(), np.zeros(3))
+    world.advance(1.0)
+    np.testing.assert_allclose(world.q, PARKED, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "kind"),
+    [
+        ("cylinder", (0.01, 0.2, 0.0), Cylinder),
+        ("box", (1.0, 2.0, 3.0), Box),
+        ("sphere", (0.05, 0.0, 0.0), Sphere),
+    ],
+)
+def test_each_shape_name_has_its_drake_shape(
+    name: str, size: tuple[float, ...], kind: type
+) -> None:
+    assert isinstance(make_shape(name, np.array(size)), kind)
+
+
+def test_the_continuous_plant_with_cenic_agrees_with_small_discrete_steps() -> None:
+    R_RL, p_RL = ARM.link_poses(np.deg2rad([-30.0, 60.0, 50.0]))
+    pushed = p_RL[2] - 0.2 * R_RL[2, :, 1] + 0.03 * R_RL[2, :, 0]
+    results = []
+    for time_step in (0.0, 0.0005):
+        q = np.deg2rad([-30.0, 60.0, 50.0])
+        clutter = make_clutter(cylinder(*pushed[:2], movable=True))
+        world = make_world(q, clutter, SceneConfig(time_step_s=time_step))
+        if time_step == 0.0:
+            config = SimulatorConfig(integration_scheme="cenic", accuracy=1e-5)
+            ApplySimulatorConfig(config, world.simulator)
+        world.set_equilibrium(q + np.array([0.2, 0.1, 0.1]))
+        world.advance(1.0)
+        results.append(np.concatenate([world.q, world.objects[0]]))
+    assert np.linalg.norm(results[1][3:] - pushed[:2]) > 0.05
+    np.testing.assert_allclose(results[0], results[1], atol=3e-3)
