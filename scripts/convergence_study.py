@@ -1,4 +1,4 @@
-"""Justifies the time step and the contact meshes: the same reaches with finer and coarser ones.
+"""Justifies the integrator and the contact meshes: the same reaches with finer and coarser ones.
 
 Random starts and goals in calibration environments, one row a variant: success rate, how often
 the outcome equals that of the 0.5 ms reference, and cost. Reaches are kept and not run again.
@@ -21,19 +21,17 @@ from lic_drake.reach.scenario import Scenario, load_scenario
 from lic_drake.seeds import make_generator
 
 VARIANTS = {
-    "step 0.5 ms": "{scene: {time_step_s: 0.0005}}",
-    "step 2.5 ms": "{scene: {time_step_s: 0.0025}}",
-    "step 5 ms (chosen)": "{scene: {time_step_s: 0.005}}",
-    "step 10 ms": "{scene: {time_step_s: 0.01}}",
-    "CENIC 1e-3": "{scene: {time_step_s: 0.0}}",
-    "meshes half as fine": (
-        "{scene: {time_step_s: 0.005, contact: {skin_mesh_m: 0.01, object_mesh_m: 0.008}}}"
-    ),
-    "meshes twice as fine": (
-        "{scene: {time_step_s: 0.005, contact: {skin_mesh_m: 0.0025, object_mesh_m: 0.002}}}"
-    ),
+    "discrete, 0.5 ms": "{scene: {time_step_s: 0.0005}}",
+    "discrete, 2.5 ms": "{scene: {time_step_s: 0.0025}}",
+    "discrete, 5 ms": "{scene: {time_step_s: 0.005}}",
+    "CENIC, up to 5 ms": "{scene: {cenic_max_step_s: 0.005}}",
+    "CENIC, up to 10 ms (chosen)": "{}",
+    "CENIC, up to 20 ms": "{scene: {cenic_max_step_s: 0.02}}",
+    "CENIC, accuracy 1e-5": "{scene: {cenic_accuracy: 1.0e-5}}",
+    "meshes half as fine": "{scene: {contact: {skin_mesh_m: 0.01, object_mesh_m: 0.008}}}",
+    "meshes twice as fine": "{scene: {contact: {skin_mesh_m: 0.0025, object_mesh_m: 0.002}}}",
 }
-REFERENCE = "step 0.5 ms"
+REFERENCE = "discrete, 0.5 ms"
 
 
 def random_requests(scenario: Scenario, reaches: int) -> list[ReachRequest]:

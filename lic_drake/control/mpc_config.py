@@ -6,6 +6,15 @@ import numpy as np
 
 from lic_drake.errors import ScenarioError
 
+# Without a weight on torque changes the controller's program would have no unique solution.
+_POSITIVE = (
+    "force_threshold_N",
+    "contact_stiffness_N_per_m",
+    "tip_step_m",
+    "torque_change_weight",
+)
+_FINITE = ("force_trim_N", "slow_distance_m", "position_weight", "force_weight", "force_decrease_N")
+
 
 @dataclass(kw_only=True)
 class MpcConfig:
@@ -50,10 +59,16 @@ class MpcConfig:
     forgive_joint_limits: bool = True
 
     def __post_init__(self) -> None:
-        for name in ("rate_hz", "force_threshold_N", "contact_stiffness_N_per_m", "tip_step_m"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0.0):
+        if not 1.0 <= self.rate_hz <= 1000.0:
+            raise ScenarioError(f"mpc rate_hz must be from 1 to 1000, got {self.rate_hz}")
+        for name, value in vars(self).items():
+            if name in _POSITIVE and not (np.isfinite(value) and value > 0.0):
                 raise ScenarioError(f"mpc {name} must be a positive number, got {value}")
+            if name in _FINITE and not (np.isfinite(value) and value >= 0.0):
+                raise ScenarioError(f"mpc {name} must be zero or a positive number, got {value}")
+            # A negative rise is a wanted fall.
+            if not value >= 0.0 and (np.isnan(value) or not name.startswith("rise")):
+                raise ScenarioError(f"mpc {name} must be zero or more, got {value}")
 
     @property
     def period_s(self) -> float:

@@ -11,7 +11,7 @@ from lic_drake.errors import LicError
 type Edge = tuple[str, str, str, str]
 """A connection: from system, its output port, to system, its input port."""
 
-_WIDTH, _ROW, _GAP = 4.2, 0.3, 2.2
+_WIDTH, _ROW, _GAP = 5.6, 0.3, 2.2
 
 
 def list_connections(diagram: Diagram) -> list[Edge]:
@@ -51,7 +51,7 @@ def draw_diagram(diagram: Diagram, path: Path) -> None:
     """
     edges = list_connections(diagram)
     columns = _columns(edges)
-    figure = Figure(figsize=(4.0 * len(columns), 6.0))
+    figure = Figure(figsize=(4.9 * len(columns), 6.0))
     ax = figure.subplots()
     ax.set_axis_off()
     ports: dict[tuple[str, str, str], tuple[float, float]] = {}

@@ -109,7 +109,9 @@ def simulate(
     simulator = Simulator(diagram, context)
     if scenario.scene.time_step_s == 0.0:
         simulator_config = SimulatorConfig(
-            integration_scheme="cenic", accuracy=scenario.scene.cenic_accuracy
+            integration_scheme="cenic",
+            accuracy=scenario.scene.cenic_accuracy,
+            max_step_size=scenario.scene.cenic_max_step_s,
         )
         ApplySimulatorConfig(simulator_config, simulator)
     step = 0

@@ -80,7 +80,7 @@ def load_scenario(name_or_path: str | Path, overrides: str = "") -> Scenario:
         content = path.read_text(encoding="utf-8")
     except UnicodeDecodeError:
         raise ScenarioError(f"{path} is not a text file; a scenario is YAML in UTF-8") from None
-    except OSError:
+    except (OSError, ValueError):  # A name with a null byte is a ValueError.
         known = ", ".join(sorted(p.stem for p in scenarios_dir().glob("*.yaml")))
         raise ScenarioError(
             f"no scenario {str(name_or_path)!r}; shipped scenarios: {known}, or give a .yaml path"
@@ -99,11 +99,17 @@ def parse_scenario(content: str, overrides: str = "", source: str = "scenario") 
         )
     if "category" not in data or "robot" not in data:
         raise ScenarioError(f"{source}: needs the keys 'category' and 'robot'")
+    for key, value in data.items():
+        if key in ("category", "robot"):
+            if not isinstance(value, str):
+                raise ScenarioError(f"{source}: {key} must be a name, got {value!r}")
+        elif value is not None and not isinstance(value, dict):
+            raise ScenarioError(f"{source}: {key} must be a YAML mapping, got {value!r}")
     sampler = get_category(data["category"])
     get_robot(data["robot"])
     mpc = dict(data.get("mpc") or {})
     preset = mpc.pop("preset", "haptic_mpc_2013")
-    if preset not in PRESETS:
+    if not isinstance(preset, str) or preset not in PRESETS:
         raise ScenarioError(f"{source}: unknown mpc preset {preset!r}; choose {list(PRESETS)}")
     return Scenario(
         category=data["category"],
@@ -120,7 +126,7 @@ def _mapping(content: str, source: str) -> dict[str, Any]:
     """Parses YAML text that must be a mapping."""
     try:
         data = yaml.safe_load(content) if content.strip() else {}
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise ScenarioError(f"{source}: not YAML: {' '.join(str(error).split())}") from None
     if not isinstance(data, dict):
         raise ScenarioError(f"{source}: must be a YAML mapping, found {type(data).__name__}")
@@ -149,7 +155,8 @@ def _typed(schema: type[Any], data: Any, source: str, defaults: Any = None) -> A
         return section
     except ScenarioError as error:
         raise ScenarioError(f"{source}: {error}") from None
-    except (RuntimeError, ValueError, TypeError, AssertionError) as error:
+    # Drake's reader reports what does not fit the schema in these ways.
+    except (AssertionError, AttributeError, RuntimeError, TypeError, ValueError) as error:
         raise ScenarioError(f"{source}: {' '.join(str(error).split())}") from None
 
 

@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 
 from lic_drake.errors import ScenarioError
 
+MAX_TIMEOUT_S = 3600.0
+"""Longer reaches are refused: simulating one would take minutes."""
+
 
 @dataclass(kw_only=True)
 class StopConfig:
@@ -16,17 +19,24 @@ class StopConfig:
     # A reach succeeds when the tip is this near the goal, metres (authors' batch scripts).
     success_distance_m: float = 0.015
     # A reach is stuck when the tip moved less than `stuck_distance_m` in `stuck_time_s`.
-    stuck_distance_m: float = 0.002
-    stuck_time_s: float = 4.0
+    stuck_distance_m: float = 0.005
+    stuck_time_s: float = 3.0
     # Simulated seconds after which a reach fails.
     timeout_s: float = 30.0
-    # A reach fails when a taxel reads more than this, N (authors' monitor).
-    force_limit_N: float = 50.0
+    # A reach fails when a taxel reads more than `force_limit_N` for `force_time_s` on end. The
+    # authors' controller shuts down at 15 N; a single sample of an impact, whose height depends
+    # on how finely the impact is simulated, does not count here.
+    force_limit_N: float = 15.0
+    force_time_s: float = 0.1
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
             if not value > 0.0:
                 raise ScenarioError(f"stop rule {name} must be positive, got {value}")
+        if self.timeout_s > MAX_TIMEOUT_S:
+            raise ScenarioError(
+                f"stop rule timeout_s must be at most {MAX_TIMEOUT_S:g}, got {self.timeout_s}"
+            )
 
 
 class StopMonitor:
@@ -36,9 +46,12 @@ class StopMonitor:
         self._config = config
         self._p_WG = p_WG
         # Tip positions from now back to `stuck_time_s` ago, at the control period.
+        # A window longer than the time-out never fills, however long it is.
+        window_s = min(config.stuck_time_s, config.timeout_s + period_s)
         self._recent: deque[NDArray[np.float64]] = deque(
-            maxlen=round(config.stuck_time_s / period_s) + 1
+            maxlen=max(1, round(window_s / period_s)) + 1
         )
+        self._low_force_time_s = 0.0
         self.min_distance = np.inf
 
     def update(self, time_s: float, p_WE: NDArray[np.float64], peak_force: float) -> str | None:
@@ -54,7 +67,9 @@ class StopMonitor:
         self.min_distance = min(self.min_distance, distance)
         if distance < self._config.success_distance_m:
             return "reached"
-        if peak_force > self._config.force_limit_N:
+        if peak_force <= self._config.force_limit_N:
+            self._low_force_time_s = time_s
+        elif time_s - self._low_force_time_s >= self._config.force_time_s - 1e-9:
             return "force"
         if len(self._recent) == self._recent.maxlen:
             moved = float(np.linalg.norm(self._recent[-1] - self._recent[0]))

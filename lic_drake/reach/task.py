@@ -10,6 +10,9 @@ from lic_drake.robots.arm import Arm
 
 Vector = NDArray[np.float64]
 
+MAX_GRID_STEPS = 1000
+"""A finer grid than this in one direction is refused."""
+
 
 @dataclass(kw_only=True)
 class StartLine:
@@ -32,6 +35,8 @@ class StartLine:
     phi_step_deg: float = 30.0
 
     def __post_init__(self) -> None:
+        if not np.isfinite(self.x_m):
+            raise ScenarioError(f"start line x_m must be a finite number, got {self.x_m}")
         _check_range("start line y_m", self.y_min_m, self.y_max_m, self.y_step_m)
         _check_range("start line phi_deg", self.phi_min_deg, self.phi_max_deg, self.phi_step_deg)
 
@@ -92,6 +97,11 @@ def _check_range(name: str, low: float, high: float, step: float) -> None:
         raise ScenarioError(
             f"{name}: needs finite numbers with min <= max and a positive step,"
             f" got {low}..{high} step {step}"
+        )
+    if (high - low) / step > MAX_GRID_STEPS:
+        raise ScenarioError(
+            f"{name}: {low}..{high} has more than {MAX_GRID_STEPS} steps of {step};"
+            " choose a larger step"
         )
 
 

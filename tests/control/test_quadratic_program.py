@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from optimality import kkt_residual, violation
 from pydrake.solvers import ClarabelSolver, MathematicalProgram, SnoptSolver, SolverInterface
 
 from lic_drake.control.quadratic_program import QuadraticProgram, solve
@@ -33,23 +34,6 @@ def cost(problem: QuadraticProgram, x: np.ndarray) -> float:
     return float(0.5 * x @ problem.P @ x + problem.c @ x)
 
 
-def violation(problem: QuadraticProgram, x: np.ndarray) -> float:
-    rows = problem.A @ x
-    return float(
-        np.max(
-            np.concatenate(
-                [
-                    problem.row_min - rows,
-                    rows - problem.row_max,
-                    problem.x_min - x,
-                    x - problem.x_max,
-                    [0.0],
-                ]
-            )
-        )
-    )
-
-
 def solve_with(solver: SolverInterface, problem: QuadraticProgram) -> np.ndarray | None:
     program = MathematicalProgram()
     x = program.NewContinuousVariables(len(problem.c))
@@ -59,39 +43,6 @@ def solve_with(solver: SolverInterface, problem: QuadraticProgram) -> np.ndarray
         program.AddLinearConstraint(problem.A, problem.row_min, problem.row_max, x)
     result = solver.Solve(program)
     return result.GetSolution(x) if result.is_success() else None
-
-
-def kkt_residual(problem: QuadraticProgram, x: np.ndarray, active: float = 1e-7) -> float:
-    """How far the cost's gradient is from the cone of the active limits' normals, relative.
-
-    The multipliers come from a non-negative fit by projected coordinate descent, not from the
-    solver under test.
-    """
-    gradient = problem.P @ x + problem.c
-    rows = np.vstack([problem.A, np.eye(len(x))])
-    low = np.concatenate([problem.row_min, problem.x_min])
-    high = np.concatenate([problem.row_max, problem.x_max])
-    value = rows @ x
-    norms = np.maximum(np.linalg.norm(rows, axis=1), 1e-300)
-    inward = np.vstack(
-        [
-            rows[np.abs(value - low) < active * norms],
-            -rows[np.abs(value - high) < active * norms],
-        ]
-    )
-    scale = np.linalg.norm(gradient) + np.linalg.norm(problem.c)
-    inward = inward / np.linalg.norm(inward, axis=1, keepdims=True)
-    multipliers = np.zeros(len(inward))
-    residual = gradient.copy()
-    for _ in range(20_000):
-        before = multipliers.copy()
-        for i, row in enumerate(inward):
-            multiplier = max(0.0, multipliers[i] + row @ residual)
-            residual -= (multiplier - multipliers[i]) * row
-            multipliers[i] = multiplier
-        if np.max(np.abs(multipliers - before), initial=0.0) < 1e-13 * scale:
-            break
-    return float(np.linalg.norm(residual) / scale)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,97 @@
+"""The controller as a system: what it makes of its ports, and when."""
+
+import numpy as np
+import pytest
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context
+from worlds import ARM, LAYOUT
+
+from lic_drake.control.mpc import HapticMpc, MpcInput
+from lic_drake.control.mpc_config import MpcConfig, haptic_mpc_2013, ijrr_2013
+from lic_drake.control.mpc_controller import HapticMpcController
+
+Q = np.deg2rad([-30.0, 60.0, 50.0])
+GOAL = np.array([0.5, -0.3, 0.0])
+
+
+def make_context(
+    config: MpcConfig, forces: np.ndarray, q_d: np.ndarray = Q
+) -> tuple[HapticMpcController, Context]:
+    controller = HapticMpcController(ARM, LAYOUT, config)
+    context = controller.CreateDefaultContext()
+    controller.GetInputPort("arm_state").FixValue(context, np.append(Q, np.zeros(3)))
+    controller.GetInputPort("taxel_force").FixValue(context, forces)
+    controller.GetInputPort("goal").FixValue(context, GOAL)
+    controller.set_equilibrium(context, q_d)
+    return controller, context
+
+
+def next_equilibrium(controller: HapticMpcController, context: Context) -> np.ndarray:
+    Simulator(controller, context).AdvanceTo(1e-6)
+    return controller.GetOutputPort("desired_state").Eval(context)
+
+
+@pytest.mark.parametrize("preset", [haptic_mpc_2013, ijrr_2013])
+def test_the_desired_state_is_one_mpc_step_on_with_no_velocity(preset: type[MpcConfig]) -> None:
+    forces = np.zeros(188)
+    forces[[60, 140, 181]] = [3.0, 7.0, 2.0]
+    q_d = Q + np.array([0.02, -0.03, 0.01])
+    config = preset()
+    controller, context = make_context(config, forces, q_d)
+    # Taxels and Jacobians by Drake-free formulas of their own: planar geometry, link by link.
+    contacts = []
+    for taxel in (60, 140, 181):
+        link = LAYOUT.link[taxel]
+        angle = np.cumsum(Q)[link]
+        c, s = np.cos(angle), np.sin(angle)
+        turn = np.array([[c, -s], [s, c]])
+        point = ARM.kinematics.link_origins(Q)[link] + turn @ LAYOUT.p_LT[taxel, :2]
+        jacobian = np.vstack([ARM.kinematics.point_jacobian(Q, link, point), np.zeros(3)])
+        contacts.append((np.append(turn @ LAYOUT.n_L[taxel, :2], 0.0), jacobian))
+    state = MpcInput(
+        q=Q,
+        q_d=q_d,
+        p_EG=GOAL - ARM.tip_position(Q),
+        Jv_E=ARM.tip_jacobian(Q),
+        normals=np.array([normal for normal, _ in contacts]),
+        forces=np.array([3.0, 7.0, 2.0]),
+        Jv_C=np.array([jacobian for _, jacobian in contacts]),
+    )
+    expected = q_d + HapticMpc(config, ARM.stiffness, ARM.q_min, ARM.q_max).step(state)
+    assert np.linalg.norm(expected - q_d) > 1e-4
+    np.testing.assert_allclose(
+        next_equilibrium(controller, context), np.append(expected, np.zeros(3)), atol=1e-12
+    )
+
+
+@pytest.mark.parametrize(("preset", "trim"), [(haptic_mpc_2013, 1.0), (ijrr_2013, 0.5)])
+def test_forces_up_to_the_trim_threshold_are_ignored(preset: type[MpcConfig], trim: float) -> None:
+    def after(force: float) -> np.ndarray:
+        forces = np.zeros(188)
+        forces[140] = force
+        return next_equilibrium(*make_context(preset(), forces))
+
+    np.testing.assert_array_equal(after(trim), after(0.0))
+    assert np.any(after(trim + 0.01) != after(0.0))
+
+
+def test_an_equilibrium_wound_up_too_far_is_pulled_back_before_the_step() -> None:
+    controller, context = make_context(haptic_mpc_2013(), np.zeros(188), Q + 1.5)
+    q_d = next_equilibrium(controller, context)[:3]
+    assert np.all(q_d <= Q + np.deg2rad(45.0) + 1e-12)
+
+
+@pytest.mark.parametrize("preset", [haptic_mpc_2013, ijrr_2013])
+def test_the_equilibrium_changes_at_the_control_rate_and_is_held_between(
+    preset: type[MpcConfig],
+) -> None:
+    config = preset()
+    controller, context = make_context(config, np.zeros(188))
+    simulator = Simulator(controller, context)
+    port = controller.GetOutputPort("desired_state")
+    values = []
+    for i in range(40):
+        simulator.AdvanceTo((i + 0.5) * config.period_s / 4.0)
+        values.append(np.array(port.Eval(context)))
+    changed = np.flatnonzero(np.any(np.diff(values, axis=0) != 0.0, axis=1)) + 1
+    np.testing.assert_array_equal(changed, np.arange(4, 40, 4))

@@ -1,0 +1,116 @@
+import numpy as np
+import pytest
+from pydrake.geometry import Meshcat
+from pydrake.multibody.tree import JointIndex
+from pydrake.systems.analysis import Simulator
+from reaches import start_angles
+from worlds import box, cylinder, make_clutter
+
+from lic_drake.control.taxels import planar_taxels
+from lic_drake.reach.diagram import ReachDiagram, make_reach_diagram
+from lic_drake.reach.scenario import load_scenario
+
+SCENARIO = load_scenario("cylinder-clutter")
+CLUTTER = make_clutter(
+    cylinder(0.5, 0.3, movable=True), cylinder(0.6, -0.2), box(0.7, 0.1, (0.1, 0.1, 0.2))
+)
+P_WG = np.array([0.6, 0.1, 0.0])
+
+
+@pytest.fixture(scope="module")
+def reach_diagram() -> ReachDiagram:
+    return make_reach_diagram(SCENARIO, CLUTTER)
+
+
+def test_the_exported_ports_have_the_documented_names_and_sizes(
+    reach_diagram: ReachDiagram,
+) -> None:
+    diagram = reach_diagram.diagram
+    inputs = [diagram.get_input_port(i) for i in range(diagram.num_input_ports())]
+    outputs = [diagram.get_output_port(i) for i in range(diagram.num_output_ports())]
+    num_taxels = planar_taxels(SCENARIO.arm().skin).num_taxels
+    assert {port.get_name(): port.size() for port in inputs} == {"goal": 3}
+    assert {port.get_name(): port.size() for port in outputs} == {
+        "arm_state": 6,
+        "clutter_state": 4,
+        "taxel_force": num_taxels,
+        "desired_state": 6,
+    }
+
+
+def test_the_controllers_and_the_sensors_ports_fit_together(reach_diagram: ReachDiagram) -> None:
+    num_taxels = planar_taxels(SCENARIO.arm().skin).num_taxels
+    sizes = {
+        name: {
+            port.get_name(): port.size()
+            for ports, count in (
+                (system.get_input_port, system.num_input_ports()),
+                (system.get_output_port, system.num_output_ports()),
+            )
+            for port in (ports(i) for i in range(count))
+        }
+        for name in ("sensor", "controller")
+        if (system := reach_diagram.diagram.GetSubsystemByName(name))
+    }
+    # An abstract port has the size 0.
+    assert sizes == {
+        "sensor": {"contact_results": 0, "arm_state": 6, "taxel_force": num_taxels},
+        "controller": {"arm_state": 6, "taxel_force": num_taxels, "goal": 3, "desired_state": 6},
+    }
+
+
+def test_every_system_has_a_name_of_its_own(reach_diagram: ReachDiagram) -> None:
+    names = [system.get_name() for system in reach_diagram.diagram.GetSystems()]
+    assert sorted(names) == ["controller", "plant", "scene_graph", "sensor", "standstill"]
+    assert reach_diagram.diagram.get_name() == "reach"
+    assert reach_diagram.visualizer is None
+
+
+def test_all_systems_run(reach_diagram: ReachDiagram) -> None:
+    # An input that was left unconnected would raise in the first steps.
+    context = reach_diagram.make_context(start_angles(SCENARIO), P_WG)
+    Simulator(reach_diagram.diagram, context).AdvanceTo(0.1)
+    for port in ("arm_state", "clutter_state", "taxel_force", "desired_state"):
+        assert np.all(np.isfinite(reach_diagram.diagram.GetOutputPort(port).Eval(context)))
+
+
+def test_the_arm_rests_at_the_start_and_wants_to_stay_there(reach_diagram: ReachDiagram) -> None:
+    q0 = start_angles(SCENARIO)
+    context = reach_diagram.make_context(q0, P_WG)
+    at_rest = np.append(q0, np.zeros(3))
+    for port in ("arm_state", "desired_state"):
+        np.testing.assert_array_equal(
+            reach_diagram.diagram.GetOutputPort(port).Eval(context), at_rest
+        )
+    np.testing.assert_array_equal(
+        reach_diagram.diagram.GetOutputPort("clutter_state").Eval(context), [0.5, 0.3, 0.0, 0.0]
+    )
+    goal = reach_diagram.controller.GetInputPort("goal")
+    controller_context = reach_diagram.controller.GetMyContextFromRoot(context)
+    np.testing.assert_array_equal(goal.Eval(controller_context), P_WG)
+
+
+def test_contexts_share_nothing(reach_diagram: ReachDiagram) -> None:
+    q0 = start_angles(SCENARIO)
+    first = reach_diagram.make_context(q0, P_WG)
+    reach_diagram.make_context(q0 + 0.1, P_WG + 0.1)
+    state = reach_diagram.diagram.GetOutputPort("arm_state").Eval(first)
+    np.testing.assert_array_equal(state[:3], q0)
+
+
+def test_only_movable_objects_have_joints(reach_diagram: ReachDiagram) -> None:
+    scene = reach_diagram.scene
+    joints = [
+        scene.plant.get_joint(JointIndex(i)).name()
+        for i in scene.plant.GetJointIndices(scene.clutter)
+    ]
+    assert joints == ["object0_x", "object0_y"]
+
+
+def test_a_visualizer_is_named_and_does_not_change_the_ports() -> None:
+    shown = make_reach_diagram(SCENARIO, CLUTTER, Meshcat())
+    assert shown.visualizer is not None
+    names = {system.get_name() for system in shown.diagram.GetSystems()}
+    assert not any("@" in name or "::" in name for name in names)
+    assert {"plant", "sensor", "controller"} < names
+    assert shown.diagram.num_output_ports() == 4

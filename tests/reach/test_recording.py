@@ -1,0 +1,164 @@
+import base64
+import re
+import struct
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.colors import rgb_to_hsv
+from matplotlib.image import imread
+from reaches import free_space, reach_request, small_clutter, start_angles
+from worlds import cylinder, make_clutter
+
+from lic_drake.errors import LicError
+from lic_drake.reach.recording import PAUSE_S, ReachRecording
+from lic_drake.reach.rollout import run_reach
+from lic_drake.reach.scenario import load_scenario
+from lic_drake.reach.trace import ReachTrace
+
+FRAMES_PER_SECOND = 20
+P_WG = np.array([0.6, 0.1, 0.0])
+LAST_LINK = b"/drake/visualizer/planar_arm/link3"
+
+
+def animation_of(html: str) -> bytes:
+    """The message (msgpack) with which the file sets its animation."""
+    messages = [base64.b64decode(text) for text in re.findall(r"base64,([\w+/]+=*)", html)]
+    (animation,) = [message for message in messages if b"set_animation" in message]
+    return animation
+
+
+def positions_of(animation: bytes, path: bytes) -> dict[int, np.ndarray]:
+    """Recorded positions of an object, frame -> (x, y, z), read from the msgpack bytes."""
+    track = animation[animation.index(path) :]
+    track = track[: track.index(b".quaternion")]
+    # {"time": n, "value": [x, y, z]}: n in 1, 2 or 3 bytes, the others as doubles.
+    entry = rb"\x82\xa4time([\x00-\x7f]|\xcc.|\xcd..)\xa5value\x93\xcb(.{8})\xcb(.{8})\xcb(.{8})"
+    return {
+        int.from_bytes(time[1:] or time): np.array(struct.unpack(">3d", x + y + z))
+        for time, x, y, z in re.findall(entry, track, re.DOTALL)
+    }
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[ReachTrace], str]:
+    """Two short reaches, one after the other, and the file that shows them."""
+    scenario = free_space(1.0)
+    clutter = make_clutter(cylinder(0.5, 0.35, movable=True), cylinder(0.9, 0.6))
+    recording = ReachRecording(scenario, clutter, FRAMES_PER_SECOND)
+    reaches = [recording.add_reach(start_angles(scenario), p) for p in (P_WG, P_WG * [1, -1, 1])]
+    path = tmp_path_factory.mktemp("recording") / "reach.html"
+    recording.save(path)
+    assert all(outcome == "timeout" and not detail for outcome, _, detail, _ in reaches)
+    assert all(wall_time_s > 0.0 for _, _, _, wall_time_s in reaches)
+    return [trace for _, trace, _, _ in reaches], path.read_text(encoding="utf-8")
+
+
+def test_the_frames_show_the_arm_where_it_was(recorded: tuple[list[ReachTrace], str]) -> None:
+    traces, html = recorded
+    frames = positions_of(animation_of(html), LAST_LINK)
+    kinematics = free_space().arm().kinematics
+    begin = 0
+    for trace in traces:
+        # 25 samples and 20 frames a second: every fifth sample is a fourth frame.
+        for k in range(0, len(trace.q), 5):
+            frame = frames[begin + 4 * k // 5]
+            # The frame may be a step of the plant older, at 0.5 m/s at most.
+            np.testing.assert_allclose(
+                frame, [*kinematics.link_origins(trace.q[k])[2], 0.0], atol=0.0026
+            )
+        # The next reach begins at a whole second, after a pause.
+        begin += FRAMES_PER_SECOND * round(trace.time_s[-1] + PAUSE_S)
+    assert len(frames) >= 2 * FRAMES_PER_SECOND
+
+
+def test_it_shows_the_objects_that_the_simulation_leaves_out(
+    recorded: tuple[list[ReachTrace], str],
+) -> None:
+    _, html = recorded
+    messages = [base64.b64decode(text) for text in re.findall(r"base64,([\w+/]+=*)", html)]
+    paths = {
+        match.decode()
+        for message in messages
+        for match in re.findall(rb"/[a-z][\w/]+", message)
+        if b"set_object" in message
+    }
+    assert any(path.startswith("/drake/visualizer/clutter/object0") for path in paths)
+    # The fixed post at (0.9, 0.6) is out of reach.
+    assert {"/scenery/object0", "/task/goal", "/task/start_line"} <= paths
+
+
+def test_it_plays_offline(recorded: tuple[list[ReachTrace], str]) -> None:
+    _, html = recorded
+    assert not re.search(r"<(script|link|img|iframe)[^>]*(src|href)\s*=", html)
+    assert not re.search(r"@import|\bimport\s*\(?\s*['\"]http", html)
+
+
+@pytest.mark.parametrize("environment", [0, 1])
+def test_a_recorded_reach_is_the_simulated_one(environment: int) -> None:
+    scenario = small_clutter(2.0)
+    request = reach_request(scenario, environment=environment)
+    expected = run_reach(request)
+    recording = ReachRecording(scenario, scenario.sample_instance("training", environment))
+    for _ in range(2):
+        outcome, trace, detail, _ = recording.add_reach(
+            start_angles(scenario), np.array(request.goal)
+        )
+        assert (outcome, detail) == (expected.outcome, expected.detail)
+        assert trace.time_s[-1] == expected.duration_s
+        np.testing.assert_allclose(trace.q[-1], expected.q_final, rtol=0.0, atol=1e-12)
+        assert max(trace.peak_force) == pytest.approx(expected.peak_force, abs=1e-9)
+
+
+def test_a_start_that_touches_is_told_and_the_recording_goes_on(tmp_path: Path) -> None:
+    scenario = free_space(0.2)
+    q0 = start_angles(scenario)
+    x, y = scenario.arm().tip_position(q0)[:2]
+    recording = ReachRecording(scenario, make_clutter(cylinder(x, y)))
+    assert recording.add_reach(q0, P_WG)[0] == "invalid_start"
+    assert recording.add_reach(q0 + [0.0, 0.3, 0.0], P_WG)[0] == "timeout"
+    recording.save(tmp_path / "reach.html")
+    assert (tmp_path / "reach.html").stat().st_size > 100_000
+
+
+def test_what_cannot_be_written_is_one_clear_error(tmp_path: Path) -> None:
+    recording = ReachRecording(free_space(0.2), make_clutter())
+    for path in (tmp_path / "none" / "reach.html", tmp_path):
+        with pytest.raises(LicError) as caught:
+            recording.save(path)
+        assert str(path) in str(caught.value)
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.browser
+def test_a_browser_shows_arm_clutter_goal_and_start_line(tmp_path: Path, chromium: str) -> None:
+    scenario = load_scenario("cylinder-clutter", "{stop: {timeout_s: 0.4}}")
+    recording = ReachRecording(scenario, scenario.sample_instance("evaluation", 0))
+    recording.add_reach(start_angles(scenario), P_WG)
+    recording.save(tmp_path / "reach.html")
+    picture = tmp_path / "reach.png"
+    command = [
+        *(chromium, "--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader"),
+        *("--enable-unsafe-swiftshader", "--virtual-time-budget=6000", "--window-size=1200,800"),
+        *(f"--user-data-dir={tmp_path / 'profile'}", f"--screenshot={picture}"),
+        f"file://{tmp_path / 'reach.html'}",
+    ]
+    subprocess.run(command, check=True, capture_output=True, timeout=120)
+
+    # Without the upper edge, where Meshcat puts its controls.
+    image = imread(picture)[40:, :, :3]
+    assert len(np.unique(image.reshape(-1, 3), axis=0)) > 500
+    hue, saturation, value = np.moveaxis(rgb_to_hsv(image), -1, 0)
+    hue = 360.0 * hue
+
+    def share(low: float, high: float) -> float:
+        return float(np.mean((hue > low) & (hue < high) & (saturation > 0.3)))
+
+    # Hues in degrees: movable 35, fixed 8, start line 130, goal 188; the arm is grey, darker
+    # than the background.
+    assert share(25, 50) > 2e-3, "movable cylinders"
+    assert share(0, 20) > 2e-3, "fixed cylinders"
+    assert share(110, 150) > 1e-4, "start line"
+    assert share(175, 200) > 1e-4, "goal"
+    assert np.mean((saturation < 0.12) & (value > 0.3) & (value < 0.93)) > 2e-3, "arm"

@@ -1,0 +1,416 @@
+import math
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from fake_reach import comparable
+from pydrake.systems.analysis import Simulator
+from reaches import free_space, reach_request, small_clutter, start_angles
+from worlds import box, cylinder, make_clutter
+
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.control import tactile_sensor
+from lic_drake.control.mpc import HapticMpc
+from lic_drake.reach import rollout as dut
+from lic_drake.reach.diagram import make_reach_diagram
+from lic_drake.reach.request import ReachRecord, ReachRequest
+from lic_drake.reach.rollout import Environment, run_reach, simulate, with_start
+from lic_drake.reach.scenario import load_scenario
+
+FREE = free_space()
+X0 = np.array(reach_request(FREE).start)
+MEASURED = (
+    *("final_x", "final_y", "final_phi", "final_vx", "final_vy"),
+    *("min_distance", "peak_force", "mean_force", "mean_contacts"),
+)
+
+
+@pytest.fixture(autouse=True)
+def fresh_process() -> Iterator[None]:
+    """Forgets the environment that an earlier test left."""
+    dut._recent.clear()
+    yield
+    dut._recent.clear()
+
+
+def in_clutter(instance: ClutterInstance, goal: tuple[float, float] = (0.6, 0.1), **values: Any):
+    """Runs a reach from the easy start in hand-made clutter."""
+    scenario = free_space(**values)
+    return Environment(scenario, instance).reach(np.array([*goal, 0.0]), X0)
+
+
+# Outcomes
+
+
+def test_a_reach_in_free_space_arrives_without_touching_anything() -> None:
+    request = reach_request(FREE)
+    record = run_reach(request)
+    arm = FREE.arm()
+    assert (record.outcome, record.success, record.detail) == ("reached", True, "")
+    assert record.min_distance < FREE.stop.success_distance_m
+    assert (record.peak_force, record.mean_force, record.peak_contacts) == (0.0, 0.0, 0)
+    assert record.mean_contacts == 0.0
+    np.testing.assert_array_equal(record.q_start, arm.solve_ik(X0))
+    final = [record.final_x, record.final_y, record.final_phi]
+    np.testing.assert_allclose(final, arm.tip_pose(np.array(record.q_final)))
+    assert np.linalg.norm(np.subtract(final[:2], [0.6, 0.1])) == pytest.approx(record.min_distance)
+    # The arm comes to the goal, so it moves towards it, and at most at 0.5 m/s.
+    velocity = np.array([record.final_vx, record.final_vy])
+    assert velocity @ (np.array([0.6, 0.1]) - final[:2]) > 0.0
+    assert 0.0 < np.linalg.norm(velocity) < 0.5
+    assert 0.0 < record.duration_s < FREE.stop.timeout_s
+    assert record.duration_s / FREE.mpc.period_s == pytest.approx(
+        round(record.duration_s / FREE.mpc.period_s)
+    )
+    assert record.wall_time_s > 0.0
+    assert (record.key, record.scenario) == (request.key, FREE.digest)
+    assert (record.category, record.robot) == ("cylinder-clutter", "planar-arm")
+    assert (record.stream, record.environment) == ("training", 0)
+    assert (tuple(record.p_WG), tuple(record.x0)) == (request.goal, request.start)
+
+
+@pytest.mark.parametrize("goal", [(0.9, 0.3), (5.0, 5.0), (-1.0, -1.0)])
+def test_goals_out_of_reach_end_without_an_error(goal: tuple[float, float]) -> None:
+    record = run_reach(reach_request(free_space(timeout_s=4.0), goal))
+    assert record.outcome in ("stuck", "timeout")
+    assert not record.success
+    tip = [record.final_x, record.final_y]
+    assert record.min_distance <= np.linalg.norm(np.subtract(goal, tip)) + 1e-12
+    assert record.min_distance > np.linalg.norm(goal) - 0.818
+
+
+def test_a_wall_leaves_the_arm_stuck_pressing_against_it() -> None:
+    wall = make_clutter(box(0.5, 0.0, (0.04, 0.8, 0.2)))
+    outcome, trace, _ = in_clutter(wall, (0.7, 0.0))
+    assert outcome == "stuck"
+    # The round end of the last link, 15 mm in radius, stands on the wall's front at x = 0.48.
+    x, _, phi = FREE.arm().tip_pose(trace.q[-1])
+    assert x - 0.015 * np.cos(phi) + 0.015 == pytest.approx(0.48, abs=5e-4)
+    assert 0.0 < trace.peak_force[-1]
+    assert trace.time_s[-1] > FREE.stop.stuck_time_s
+
+
+def test_a_hard_knock_ends_the_reach_by_force() -> None:
+    scenario = load_scenario("cylinder-clutter", "{stop: {force_limit_N: 1, force_time_s: 0.1}}")
+    wall = make_clutter(box(0.5, 0.0, (0.04, 0.8, 0.2)))
+    outcome, trace, _ = Environment(scenario, wall).reach(np.array([0.7, 0.0, 0.0]), X0)
+    assert outcome == "force"
+    # 0.1 s are three control periods: the last sample below the limit and three above it.
+    assert [force > 1.0 for force in trace.peak_force[-4:]] == [False, True, True, True]
+
+
+def test_time_runs_out_at_the_sample_of_the_timeout() -> None:
+    record = run_reach(reach_request(free_space(timeout_s=0.4)))
+    assert (record.outcome, record.duration_s) == ("timeout", 0.4)
+
+
+def assert_never_began(record: ReachRecord, outcome: str) -> None:
+    assert (record.outcome, record.success, record.duration_s) == (outcome, False, 0.0)
+    assert all(math.isnan(getattr(record, name)) for name in MEASURED)
+    assert (record.q_start, record.q_final, record.peak_contacts) == ((), (), 0)
+
+
+def test_a_start_without_a_configuration_is_invalid() -> None:
+    record = run_reach(reach_request(FREE, phi_deg=-90.0))
+    assert_never_began(record, "invalid_start")
+    assert record.detail == "no configuration within the joint limits"
+
+
+@pytest.mark.parametrize("start", [(math.nan, 0.0, 0.0), (0.335, math.inf, 0.0), (9.0, 9.0, 9.0)])
+@pytest.mark.filterwarnings("ignore:invalid value")
+def test_an_impossible_start_is_invalid_and_no_error(start: tuple[float, float, float]) -> None:
+    record = run_reach(with_start(reach_request(FREE), np.array(start)))
+    assert_never_began(record, "invalid_start")
+
+
+def test_a_start_that_touches_a_cylinder_is_invalid() -> None:
+    crowded = load_scenario(
+        "cylinder-clutter",
+        "{clutter: {num_movable: 0, num_fixed: 1, lower: [0.33, -0.005], upper: [0.34, 0.005]}}",
+    )
+    record = run_reach(reach_request(crowded))
+    assert_never_began(record, "invalid_start")
+    assert record.detail == "the arm touches the clutter at its start"
+
+
+@pytest.mark.parametrize("movable", [False, True])
+def test_touching_begins_where_the_surfaces_meet(movable: bool) -> None:
+    # The last link's round end reaches as far as the tip; the cylinder's radius is 10 mm.
+    along = np.array([np.cos(X0[2]), np.sin(X0[2])])
+    for gap, expected in ((0.0003, False), (-0.0003, True)):
+        x, y = X0[:2] + (0.010 + gap) * along
+        outcome, trace, _ = in_clutter(make_clutter(cylinder(x, y, movable=movable)), timeout_s=0.1)
+        assert (outcome == "invalid_start") == expected
+        assert (trace.q == []) == expected
+
+
+# Failures of the simulation
+
+
+class Failing(Simulator):
+    """A simulator that fails after three control periods, in Drake's way."""
+
+    def AdvanceTo(self, boundary_time: float, *args: Any, **values: Any) -> Any:
+        if boundary_time > 0.13:
+            raise RuntimeError("The solver\n  failed to converge at t = 0.12")
+        return super().AdvanceTo(boundary_time, *args, **values)
+
+
+def test_a_solver_failure_is_an_outcome_with_what_was_measured_before(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(dut, "Simulator", Failing)
+    record = run_reach(reach_request(FREE))
+    assert (record.outcome, record.success) == ("diverged", False)
+    assert record.detail == "The solver failed to converge at t = 0.12"
+    assert record.duration_s == pytest.approx(0.12)
+    assert math.isfinite(record.final_x) and len(record.q_final) == 3
+
+
+def failing_after(calls: int, original: Callable[..., Any], failure: Any) -> Callable[..., Any]:
+    """Returns the function with a failure, raised or returned, after some calls."""
+    count = 0
+
+    def function(*args: Any) -> Any:
+        nonlocal count
+        count += 1
+        if count <= calls:
+            return original(*args)
+        if isinstance(failure, Exception):
+            raise failure
+        return failure
+
+    return function
+
+
+@pytest.mark.parametrize(
+    "failure",
+    [
+        np.linalg.LinAlgError("Matrix is not positive definite"),
+        FloatingPointError("overflow"),
+        ValueError("array must not contain infs or NaNs"),
+    ],
+)
+def test_a_failure_of_the_controllers_mathematics_is_an_outcome(
+    monkeypatch: pytest.MonkeyPatch, failure: Exception
+) -> None:
+    monkeypatch.setattr(HapticMpc, "step", failing_after(5, HapticMpc.step, failure))
+    record = run_reach(reach_request(FREE))
+    assert (record.outcome, record.detail) == ("diverged", str(failure))
+    assert record.duration_s == pytest.approx(0.2)
+
+
+def test_a_failure_while_the_taxels_are_read_is_an_outcome(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    failing = failing_after(7, tactile_sensor.read_patches, RuntimeError("contact solver"))
+    monkeypatch.setattr(tactile_sensor, "read_patches", failing)
+    record = run_reach(reach_request(FREE))
+    assert (record.outcome, record.detail) == ("diverged", "contact solver")
+
+
+def test_joint_angles_that_are_no_numbers_are_an_outcome(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(HapticMpc, "step", failing_after(5, HapticMpc.step, np.full(3, np.nan)))
+    record = run_reach(reach_request(FREE))
+    assert record.outcome == "diverged"
+    assert record.detail
+    assert all(math.isfinite(value) for value in record.q_final)
+
+
+def test_a_reach_that_fails_before_its_first_sample_has_no_measurements(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(Failing, "AdvanceTo", failing_after(0, print, RuntimeError("x" * 1000)))
+    monkeypatch.setattr(dut, "Simulator", Failing)
+    record = run_reach(reach_request(FREE))
+    assert_never_began(record, "diverged")
+    assert record.detail == "x" * 200
+
+
+def test_a_goal_that_is_no_number_is_an_outcome() -> None:
+    record = run_reach(reach_request(FREE, (math.nan, 0.0)))
+    assert record.outcome == "diverged"
+
+
+def test_the_next_reach_is_not_harmed_by_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+    request = reach_request(small_clutter(1.0))
+    expected = run_reach(request)
+    with monkeypatch.context() as patch:
+        patch.setattr(dut, "Simulator", Failing)
+        assert run_reach(request).outcome == "diverged"
+    assert run_reach(request) == expected
+
+
+# The record is a function of the request
+
+
+def requests() -> list[ReachRequest]:
+    """Reaches with and without contact in three environments, one that never begins."""
+    scenario = small_clutter(2.0)
+    return [
+        reach_request(scenario, (0.6, 0.1), environment=0),
+        reach_request(scenario, (0.65, -0.1), 0.1, 60.0, environment=1),
+        reach_request(scenario, (0.6, 0.1), phi_deg=-90.0, environment=1),
+        reach_request(scenario, (0.7, 0.0), -0.2, 30.0, environment=2),
+        reach_request(scenario, (0.7, 0.0), 0.0, 90.0, environment=0),
+    ]
+
+
+def alone(request: ReachRequest) -> ReachRecord:
+    dut._recent.clear()
+    return run_reach(request)
+
+
+def test_records_do_not_depend_on_what_ran_before_in_the_process() -> None:
+    expected = [alone(request) for request in requests()]
+    assert any(record.peak_contacts > 0 for record in expected)
+    in_a_row = [run_reach(request) for request in requests()]
+    # NaN is not equal to itself, hence the comparison as text; dataclasses compare the others.
+    assert comparable(in_a_row) == comparable(expected)
+    backwards = [run_reach(request) for request in reversed(requests())]
+    assert comparable(backwards[::-1]) == comparable(expected)
+    assert run_reach(requests()[0]) == run_reach(requests()[0]) == expected[0]
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_records_are_the_same_in_other_processes(workers: int) -> None:
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    expected = [alone(request) for request in requests()]
+    with ProcessPoolExecutor(workers, mp_context=get_context("forkserver")) as pool:
+        elsewhere = list(pool.map(run_reach, requests()))
+    assert comparable(elsewhere) == comparable(expected)
+
+
+def test_only_the_last_environment_is_kept() -> None:
+    scenario = free_space(0.04)
+    first = dut.environment_of(reach_request(scenario, environment=0))
+    assert dut.environment_of(reach_request(scenario, (0.5, 0.0), environment=0)) is first
+    second = dut.environment_of(reach_request(scenario, environment=1))
+    assert second is not first
+    assert list(dut._recent.values()) == [second]
+
+
+def test_another_scenario_or_stream_is_another_environment() -> None:
+    request = reach_request(free_space(0.04))
+    first = dut.environment_of(request)
+    assert dut.environment_of(reach_request(free_space(0.08))) is not first
+    other = dut.environment_of(reach_request(free_space(0.04), stream="evaluation"))
+    assert dut.environment_of(request) is not other
+
+
+def test_with_start_changes_the_start_only() -> None:
+    request = reach_request(FREE)
+    moved = with_start(request, np.array([0.335, 0.1, 1.0]))
+    assert moved.start == (0.335, 0.1, 1.0)
+    assert with_start(moved, np.array(request.start)) == request
+
+
+# Left-out objects
+
+
+@pytest.mark.parametrize(
+    ("environment", "goal", "y_m", "phi_deg"),
+    [(0, (0.6, 0.1), 0.0, 60.0), (1, (0.75, -0.2), -0.2, 30.0), (2, (0.65, 0.3), 0.3, 90.0)],
+)
+def test_what_is_left_out_makes_no_difference(
+    monkeypatch: pytest.MonkeyPatch,
+    environment: int,
+    goal: tuple[float, float],
+    y_m: float,
+    phi_deg: float,
+) -> None:
+    scenario = load_scenario("cylinder-clutter", "{stop: {timeout_s: 5}}")
+    request = reach_request(scenario, goal, y_m, phi_deg, environment)
+    culled = alone(request)
+    assert not np.all(dut.environment_of(request).keep)
+    monkeypatch.setattr(dut, "select_near", lambda instance, _: np.ones(80, bool))
+    whole = alone(request)
+    assert np.all(dut.environment_of(request).keep)
+    assert (culled.outcome, culled.duration_s) == (whole.outcome, whole.duration_s)
+    assert culled.peak_contacts == whole.peak_contacts
+    for name in MEASURED:
+        # The solver adds in another order, so the last digits differ.
+        assert getattr(culled, name) == pytest.approx(getattr(whole, name), abs=1e-6), name
+
+
+def test_pushing_an_object_outwards_repeats_the_reach_in_the_whole_environment(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # A box that slides easily, and behind it, too far away to be kept, a post that stops it.
+    scenario = load_scenario(
+        "cylinder-clutter", "{scene: {ground_friction_N: 0.2}, stop: {timeout_s: 11, force_limit_N: 100}}"
+    )
+    sled = box(0.76, 0.0, (0.12, 0.4, 0.2), movable=True)
+    post = cylinder(0.949, 0.0, radius=0.05)
+    p_WG = np.array([0.8, 0.0, 0.0])
+    assert Environment(scenario, make_clutter(sled)).reach(p_WG, X0)[0] == "reached"
+
+    built: list[int] = []
+
+    def make(*args: Any) -> Any:
+        built.append(args[1].num_objects)
+        return make_reach_diagram(*args)
+
+    monkeypatch.setattr(dut, "make_reach_diagram", make)
+    environment = Environment(scenario, make_clutter(sled, post))
+    assert environment.keep.tolist() == [True, False]
+    assert environment.reach(np.array([0.5, 0.1, 0.0]), X0)[0] == "reached"
+    assert built == [1], "a reach that moves nothing needs no more"
+    outcome, trace, _ = environment.reach(p_WG, X0)
+    assert outcome == "timeout"
+    # Sled against post: 0.949 - 0.05 - 0.06.
+    assert trace.outermost_m == pytest.approx(0.839, abs=2e-3)
+    assert built == [1, 2]
+    again, _, _ = environment.reach(p_WG, X0)
+    assert (again, built) == ("timeout", [1, 2]), "the whole environment is built once"
+
+
+# Time
+
+
+@pytest.mark.parametrize("preset", ["haptic_mpc_2013", "ijrr_2013"])
+@pytest.mark.parametrize("begin_s", [3.0, 17.0])
+def test_a_reach_that_begins_later_is_the_same(preset: str, begin_s: float) -> None:
+    scenario = load_scenario(
+        "cylinder-clutter", f"{{mpc: {{preset: {preset}}}, stop: {{timeout_s: 2}}}}"
+    )
+    clutter = make_clutter(cylinder(0.36, -0.05, movable=True), cylinder(0.39, 0.03))
+    diagram = make_reach_diagram(scenario, clutter)
+    q0, p_WG = start_angles(scenario), np.array([0.7, 0.1, 0.0])
+    expected, trace, _ = simulate(diagram, scenario, q0, p_WG)
+    outcome, later, _ = simulate(diagram, scenario, q0, p_WG, begin_s=begin_s)
+    assert max(trace.contacts) > 0
+    assert outcome == expected
+    assert later.time_s == trace.time_s
+    np.testing.assert_allclose(later.q, trace.q, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(later.peak_force, trace.peak_force, rtol=0.0, atol=1e-9)
+
+
+def test_samples_are_a_control_period_apart_from_zero() -> None:
+    scenario = free_space(0.4)
+    diagram = make_reach_diagram(scenario, make_clutter())
+    _, trace, _ = simulate(diagram, scenario, start_angles(scenario), np.array([0.6, 0.1, 0.0]))
+    np.testing.assert_allclose(trace.time_s, 0.04 * np.arange(11), atol=1e-12)
+    np.testing.assert_array_equal(trace.q[0], start_angles(scenario))
+    arm = scenario.arm()
+    np.testing.assert_allclose(trace.p_WE, [arm.tip_position(q) for q in trace.q])
+
+
+def test_a_continuous_plant_gives_nearly_the_same_reach() -> None:
+    # The CENIC integrator controls its own error; free space needs no contact at all.
+    continuous = load_scenario(
+        "cylinder-clutter",
+        "{clutter: {num_movable: 0, num_fixed: 0}, scene: {time_step_s: 0}, stop: {timeout_s: 2}}",
+    )
+    discrete = free_space(2.0)
+    tips = []
+    for scenario in (continuous, discrete):
+        diagram = make_reach_diagram(scenario, make_clutter())
+        q0 = start_angles(scenario)
+        _, trace, _ = simulate(diagram, scenario, q0, np.array([0.7, 0.1, 0.0]))
+        tips.append(np.array(trace.p_WE))
+    assert np.linalg.norm(np.ptp(tips[0], axis=0)) > 0.05
+    np.testing.assert_allclose(tips[0], tips[1], atol=3e-3)

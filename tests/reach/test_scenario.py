@@ -1,0 +1,305 @@
+import copy
+import dataclasses
+import math
+import pickle
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from lic_drake.control.mpc_config import ijrr_2013
+from lic_drake.errors import LicError, ScenarioError
+from lic_drake.paths import scenarios_dir
+from lic_drake.reach.scenario import Scenario, load_scenario, parse_scenario, to_dict
+
+SHIPPED = sorted(path.stem for path in scenarios_dir().glob("*.yaml"))
+TEXT = (scenarios_dir() / "cylinder-clutter.yaml").read_text(encoding="utf-8")
+
+
+def error_of(overrides: str) -> str:
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario("cylinder-clutter", overrides)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_every_shipped_scenario_loads_with_what_its_file_says(name: str) -> None:
+    scenario = load_scenario(name)
+    content = yaml.safe_load((scenarios_dir() / f"{name}.yaml").read_text(encoding="utf-8"))
+    content.get("mpc", {}).pop("preset", None)
+    values = to_dict(scenario)
+
+    def compare(given: Any, read: Any) -> None:
+        for key, value in given.items():
+            if isinstance(value, dict):
+                compare(value, read[key])
+            else:
+                assert read[key] == value
+
+    compare(content, values)
+
+
+def test_the_papers_numbers_are_the_scenarios() -> None:
+    # Section IV-A: 40 + 40 cylinders of 1 cm in 0.65 x 2.4 m, goals in 0.4 x 0.8 m, a start line
+    # of 0.8 m; section V-A: "don't care" up to 5 N.
+    scenario = load_scenario("cylinder-clutter")
+    instance = scenario.sample_instance("training", 0)
+    assert (instance.movable.sum(), (~instance.movable).sum()) == (40, 40)
+    assert set(instance.size[:, 0]) == {0.01}
+    clutter, goals = scenario.clutter, scenario.task.goal_area
+    np.testing.assert_allclose(np.subtract(clutter.upper, clutter.lower), [0.65, 2.4])
+    np.testing.assert_allclose(np.subtract(goals.upper, goals.lower), [0.4, 0.8])
+    assert np.ptp([scenario.task.start_line.y_min_m, scenario.task.start_line.y_max_m]) == 0.8
+    assert scenario.mpc.force_threshold_N == 5.0
+
+
+def test_a_path_works_like_a_name(tmp_path: Path) -> None:
+    path = tmp_path / "mine.yml"
+    path.write_text(TEXT, encoding="utf-8")
+    assert load_scenario(path) == load_scenario("cylinder-clutter")
+
+
+def test_overrides_replace_single_values_at_every_level() -> None:
+    plain = load_scenario("cylinder-clutter")
+    changed = load_scenario(
+        "cylinder-clutter",
+        "{stop: {timeout_s: 7}, scene: {contact: {object_friction: 0.5}},"
+        " task: {goal_area: {upper: [0.9, 0.4]}}}",
+    )
+    expected = copy.deepcopy(plain)
+    expected.stop.timeout_s = 7.0
+    expected.scene.contact.object_friction = 0.5
+    expected.task.goal_area.upper = [0.9, 0.4]
+    assert changed == expected
+
+
+def test_an_mpc_preset_fills_what_the_file_leaves_open() -> None:
+    changed = load_scenario("cylinder-clutter", "{mpc: {preset: ijrr_2013, force_threshold_N: 3}}")
+    assert changed.mpc == dataclasses.replace(ijrr_2013(), force_threshold_N=3.0)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        ("{colour: red}", "unknown key 'colour'; known: ['category', 'clutter', "),
+        ("{stop: {timeout: 3}}", "stop: "),
+        ("{scene: {contact: {stiffness: 3}}}", "scene: "),
+        ("{stop: {timeout_s: soon}}", "stop: "),
+        ("{stop: {timeout_s: [3]}}", "stop: "),
+        ("{stop: 3}", "stop must be a YAML mapping, got 3"),
+        ("{mpc: [1]}", "mpc must be a YAML mapping, got [1]"),
+        ("{stop: {1: 2}}", "stop: "),
+        ("{stop: {timeout_s: .nan}}", "stop: stop rule timeout_s must be positive, got nan"),
+        ("{stop: {timeout_s: -1}}", "stop: stop rule timeout_s must be positive, got -1.0"),
+        ("{stop: {timeout_s: .inf}}", "stop: stop rule timeout_s must be at most 3600, got inf"),
+        ("{stop: {force_limit_N: 0}}", "stop: stop rule force_limit_N must be positive, got 0.0"),
+        ("{scene: {time_step_s: -0.005}}", "scene: time_step_s must be from 1e-05 to 0.1, or 0"),
+        ("{scene: {time_step_s: .nan}}", "scene: time_step_s must be from 1e-05 to 0.1, or 0"),
+        ("{scene: {contact_approximation: tamsi}}", "must be one of sap, similar, lagged, got"),
+        ("{scene: {ground_friction_N: 0}}", "ground_friction_N must be a positive number"),
+        ("{scene: {contact: {skin_modulus_Pa: 0}}}", "contact skin_modulus_Pa must be positive"),
+        ("{scene: {contact: {skin_mesh_m: 1.0e-9}}}", "contact skin_mesh_m must be at least"),
+        ("{scene: {contact: {object_friction: -1}}}", "object_friction must be zero or positive"),
+        ("{mpc: {rate_hz: 0}}", "mpc rate_hz must be from 1 to 1000, got 0"),
+        ("{mpc: {force_weight: .nan}}", "mpc force_weight must be zero or a positive number"),
+        ("{mpc: {max_change_deg: -1}}", "mpc max_change_deg must be zero or more, got -1.0"),
+        ("{mpc: {torque_change_weight: 0}}", "torque_change_weight must be a positive number"),
+        ("{clutter: {num_movable: -1}}", "clutter: num_movable must be from 0 to"),
+        ("{clutter: {num_movable: 2.5}}", "clutter: "),
+        ("{task: {start_line: {x_m: .nan}}}", "task: start line x_m must be a finite number"),
+        ("{task: {goal_area: {step_m: 0}}}", "task: goal area x: needs finite numbers"),
+        ("{task: {goal_area: {step_m: 1.0e-9}}}", "more than 1000 steps of 1e-09"),
+        ("{category: jungle}", "unknown category 'jungle'; choose one of cylinder-clutter"),
+        ("{category: [cylinder-clutter]}", "category must be a name, got ['cylinder-clutter']"),
+        ("{robot: r2d2}", "unknown robot 'r2d2'; choose one of planar-arm"),
+        ("{robot: null}", "robot must be a name, got None"),
+        ("{mpc: {preset: greedy}}", "unknown mpc preset 'greedy'; choose ['haptic_mpc_2013', "),
+        ("{mpc: {preset: {a: 1}}}", "unknown mpc preset {'a': 1}"),
+        ("[1, 2]", "overrides: must be a YAML mapping, found list"),
+        ("stop: {", "overrides: not YAML: "),
+        ("stop: {timeout_s: 2020-13-45}", "overrides: not YAML: month must be in 1..12"),
+        ("stop: " + "[" * 3000, "overrides: not YAML: "),
+    ],
+)
+def test_what_does_not_fit_is_refused_with_its_place_and_value(
+    overrides: str, message: str
+) -> None:
+    assert message in error_of(overrides)
+
+
+@pytest.mark.parametrize("name", ["jungle", "none.yaml", "a\x00b.yaml", "", "x" * 5000])
+def test_a_missing_scenario_names_the_shipped_ones(name: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(name)
+    assert f"shipped scenarios: {', '.join(SHIPPED)}" in str(caught.value)
+
+
+def test_a_folder_or_a_binary_file_is_no_scenario(tmp_path: Path) -> None:
+    folder, binary = tmp_path / "folder.yaml", tmp_path / "binary.yaml"
+    folder.mkdir()
+    binary.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ScenarioError, match="no scenario"):
+        load_scenario(folder)
+    with pytest.raises(ScenarioError, match="is not a text file"):
+        load_scenario(binary)
+
+
+def test_category_and_robot_are_needed() -> None:
+    with pytest.raises(ScenarioError, match="needs the keys 'category' and 'robot'"):
+        parse_scenario("stop: {timeout_s: 3}")
+
+
+def check(content: str) -> None:
+    """Parses; whatever the content, the result is a usable scenario or a one-line ScenarioError."""
+    try:
+        scenario = parse_scenario(content)
+    except ScenarioError as error:
+        assert "\n" not in str(error)
+    else:
+        assert len(scenario.digest) == 12
+        scenario.task.goal_area.grid()
+
+
+SCALARS = (
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats()
+    | st.sampled_from(["", "1.5", "lagged", "2020-13-45", "!!int x"])
+    | st.text(max_size=8)
+)
+VALUES = st.recursive(
+    SCALARS,
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.dictionaries(st.text(max_size=5) | st.integers() | st.none(), inner, max_size=3)
+    ),
+    max_leaves=5,
+)
+
+
+def paths(content: dict[str, Any]) -> Iterator[tuple[str, ...]]:
+    for key, value in content.items():
+        yield (key,)
+        if isinstance(value, dict):
+            yield from ((key, *path) for path in paths(value))
+
+
+FULL = to_dict(load_scenario("cylinder-clutter"))
+PATHS = sorted(paths(FULL))
+
+
+@settings(max_examples=150)
+@given(st.lists(st.tuples(st.sampled_from(PATHS), VALUES), min_size=1, max_size=2))
+@example([(("clutter", "upper"), [math.inf, 1e308])])
+@example([(("task", "start_line", "y_step_m"), 5e-324)])
+def test_random_values_never_raise_anything_else(
+    mutations: list[tuple[tuple[str, ...], Any]],
+) -> None:
+    content = copy.deepcopy(FULL)
+    for (*parents, key), value in mutations:
+        section = content
+        for parent in parents:
+            section = section.get(parent) if isinstance(section, dict) else None
+        if isinstance(section, dict):
+            section[key] = value
+    check(yaml.safe_dump(content, allow_unicode=True))
+
+
+@given(st.text() | st.text("{}[]:,-&*?!|>'\"%@ \nab1.", max_size=40))
+def test_random_text_never_raises_anything_else(content: str) -> None:
+    check(content)
+
+
+def leaves(section: Any) -> Iterator[tuple[Any, str]]:
+    """Yields every plain value of nested dataclasses as its owner and its name."""
+    for item in dataclasses.fields(section):
+        value = getattr(section, item.name)
+        if dataclasses.is_dataclass(value):
+            yield from leaves(value)
+        else:
+            yield section, item.name
+
+
+def changed(value: Any) -> Any:
+    match value:
+        case bool():
+            return not value
+        case str():
+            return value + "2"
+        case list():
+            return [value[0], math.nextafter(value[1], math.inf)]
+        case int():
+            return value + 1
+        case _:
+            return 1.0 if math.isinf(value) else math.nextafter(value, math.inf)
+
+
+def test_the_digest_changes_with_every_value_by_as_little_as_one_bit() -> None:
+    scenario = load_scenario("cylinder-clutter")
+    digests = [scenario.digest]
+    for owner, name in leaves(scenario):
+        value = getattr(owner, name)
+        setattr(owner, name, changed(value))
+        digests.append(scenario.digest)
+        setattr(owner, name, value)
+    assert len(digests) > 50
+    assert len(set(digests)) == len(digests)
+    assert scenario.digest == digests[0]
+
+
+def test_the_digest_ignores_comments_order_and_how_numbers_are_written() -> None:
+    plain = parse_scenario(TEXT)
+    content = yaml.safe_load(TEXT)
+    backwards = yaml.safe_dump(dict(reversed(content.items())), sort_keys=False)
+    assert backwards != yaml.safe_dump(content, sort_keys=False)
+    without_comments = yaml.safe_dump(content)
+    assert "#" in TEXT and "#" not in without_comments
+    integers = without_comments.replace("mass_kg: 1.0\n", "mass_kg: 1\n")
+    assert integers != without_comments
+    for text in (backwards, without_comments, integers):
+        assert parse_scenario(text).digest == plain.digest
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_a_scenario_survives_pickling(name: str) -> None:
+    scenario = load_scenario(name)
+    copied: Scenario = pickle.loads(pickle.dumps(scenario))
+    assert copied == scenario
+    assert copied.digest == scenario.digest
+
+
+def test_environments_and_goals_are_functions_of_their_index() -> None:
+    scenario, twin = load_scenario("cylinder-clutter"), load_scenario("cylinder-clutter")
+    first = scenario.sample_instance("training", 3)
+    scenario.sample_instance("training", 4)
+    np.testing.assert_array_equal(first.p_WO, twin.sample_instance("training", 3).p_WO)
+    others = [
+        scenario.sample_instance("training", 4),
+        scenario.sample_instance("evaluation", 3),
+    ]
+    assert not any(np.any(first.p_WO == other.p_WO, where=[True, True, False]) for other in others)
+    goals = np.array(
+        [
+            scenario.sample_goal(stream, environment, index)
+            for stream in ("training", "evaluation")
+            for environment in (0, 1)
+            for index in (0, 1)
+        ]
+    )
+    assert len(np.unique(goals, axis=0)) == 8
+    np.testing.assert_array_equal(goals[5], twin.sample_goal("evaluation", 0, 1))
+
+
+def test_unknown_streams_and_negative_environments_are_refused() -> None:
+    scenario = load_scenario("cylinder-clutter")
+    with pytest.raises(LicError, match="unknown seed stream 'test'"):
+        scenario.sample_instance("test", 0)
+    with pytest.raises(LicError, match="from 0 to 2\\^32 - 1"):
+        scenario.sample_instance("training", -1)

@@ -1,0 +1,189 @@
+"""Motions in closed form, and the sample at which each rule must end them."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lic_drake.errors import ScenarioError
+from lic_drake.reach.stop_rules import StopConfig, StopMonitor
+
+PERIOD_S = 0.04
+FAR = np.array([10.0, 0.0, 0.0])
+RULES = StopConfig(
+    success_distance_m=0.015,
+    stuck_distance_m=0.002,
+    stuck_time_s=4.0,
+    timeout_s=30.0,
+    force_limit_N=50.0,
+    force_time_s=0.1,
+)
+
+
+def still(t: float) -> float:
+    return 0.0
+
+
+def ending(
+    x: Callable[[float], float],
+    force: Callable[[float], float] = still,
+    p_WG: np.ndarray = FAR,
+    config: StopConfig = RULES,
+    period_s: float = PERIOD_S,
+) -> tuple[str, int]:
+    """Outcome and index of the sample that ends a motion along x."""
+    monitor = StopMonitor(config, p_WG, period_s)
+    for k in range(100_000):
+        t = k * period_s
+        outcome = monitor.update(t, np.array([x(t), 0.0, 0.0]), force(t))
+        if outcome is not None:
+            return outcome, k
+    raise AssertionError("no rule ended the motion")
+
+
+def test_a_straight_line_reaches_when_it_is_near_enough() -> None:
+    # 0.1 - 0.004 k < 0.015 from k = 22 on.
+    assert ending(lambda t: 0.1 * t, p_WG=np.array([0.1, 0.0, 0.0])) == ("reached", 22)
+
+
+def test_a_goal_at_the_start_is_reached_at_once() -> None:
+    assert ending(still, p_WG=np.zeros(3)) == ("reached", 0)
+
+
+def test_distance_counts_in_all_directions() -> None:
+    # sqrt(0.3^2 + 0.4^2) = 0.5: 0.01 m off in y and z each keeps 0.0141 m.
+    goal = np.array([0.1, 0.01, 0.01])
+    assert ending(lambda t: 0.1, p_WG=goal) == ("reached", 0)
+    assert ending(lambda t: 0.1, p_WG=goal + [0.006, 0.0, 0.0])[0] == "stuck"
+
+
+def test_standing_still_is_stuck_after_exactly_four_seconds() -> None:
+    assert ending(still) == ("stuck", 100)
+
+
+def test_four_seconds_are_four_seconds_at_every_control_rate() -> None:
+    assert ending(still, period_s=0.01) == ("stuck", 400)
+
+
+def test_a_creep_below_the_limit_is_stuck_and_one_above_is_not() -> None:
+    # In 4 s: 1.6 mm and 2.4 mm; 30 s are 750 samples.
+    assert ending(lambda t: 0.0004 * t) == ("stuck", 100)
+    assert ending(lambda t: 0.0006 * t) == ("timeout", 750)
+
+
+def test_a_motion_that_ends_is_stuck_four_seconds_later() -> None:
+    # 0.06 m/s for 2 s: only the sample at 2 s is within 2 mm of the end.
+    assert ending(lambda t: 0.06 * min(t, 2.0)) == ("stuck", 150)
+
+
+def test_a_slow_reach_is_out_of_time_at_the_sample_of_the_timeout() -> None:
+    short = StopConfig(timeout_s=1.2)
+    assert ending(lambda t: 0.01 * t, config=short) == ("timeout", 30)
+    # 0.1 s is no multiple of 0.04 s: the first sample after it ends the reach.
+    assert ending(still, config=StopConfig(timeout_s=0.1)) == ("timeout", 3)
+
+
+def test_force_ends_a_reach_when_it_is_over_the_limit_for_long_enough() -> None:
+    # 10 N/s: exactly 50 N at sample 125 are allowed; 0.1 s later is sample 127.5.
+    assert ending(lambda t: 0.01 * t, lambda t: 10.0 * t) == ("force", 128)
+    # At 100 Hz it is samples 500 and 510.
+    assert ending(lambda t: 0.01 * t, lambda t: 10.0 * t, period_s=0.01) == ("force", 510)
+
+
+def test_impacts_of_a_sample_or_two_do_not_end_a_reach() -> None:
+    def knocks(samples: int) -> Callable[[float], float]:
+        return lambda t: 99.0 * (round(t / PERIOD_S) % 10 in range(1, 1 + samples))
+
+    assert ending(lambda t: 0.01 * t, knocks(2)) == ("timeout", 750)
+    assert ending(lambda t: 0.01 * t, knocks(3)) == ("force", 3)
+
+
+def test_a_force_that_is_no_number_counts_as_too_high() -> None:
+    assert ending(lambda t: 0.01 * t, lambda t: np.nan) == ("force", 3)
+
+
+def test_a_goal_that_is_reached_with_a_knock_is_reached() -> None:
+    goal = np.array([0.1, 0.0, 0.0])
+    # Over the limit from sample 20 or 19 on, three samples before the goal or four.
+    assert ending(lambda t: 0.1 * t, lambda t: 99.0 * (t > 0.79), goal) == ("reached", 22)
+    assert ending(lambda t: 0.1 * t, lambda t: 99.0 * (t > 0.75), goal) == ("force", 21)
+
+
+def test_a_stuck_window_shorter_than_a_step_still_spans_one() -> None:
+    short = StopConfig(stuck_time_s=0.001)
+    assert ending(still, config=short) == ("stuck", 1)
+    assert ending(lambda t: 0.06 * t, config=short)[0] == "timeout"
+
+
+@pytest.mark.parametrize("stuck_time_s", [30.04, 1e6, 1e300, np.inf])
+def test_a_stuck_time_over_the_timeout_switches_the_rule_off(stuck_time_s: float) -> None:
+    assert ending(still, config=StopConfig(stuck_time_s=stuck_time_s)) == ("timeout", 750)
+
+
+def test_the_smallest_distance_is_kept() -> None:
+    monitor = StopMonitor(RULES, np.array([0.0, 1.0, 0.0]), PERIOD_S)
+    for k in range(50):
+        monitor.update(k * PERIOD_S, np.array([0.1 * k - 2.0, 0.0, 0.0]), 0.0)
+    assert monitor.min_distance == pytest.approx(1.0)
+
+
+@given(
+    st.lists(
+        st.tuples(st.floats(-0.002, 0.002), st.sampled_from([0.0, 50.0, 51.0])),
+        min_size=1,
+        max_size=60,
+    ),
+    st.integers(1, 20),
+    st.integers(1, 70),
+    st.floats(-0.02, 0.02),
+)
+def test_the_first_rule_that_holds_over_the_whole_motion_ends_it(
+    samples: list[tuple[float, float]], window: int, last: int, goal: float
+) -> None:
+    config = StopConfig(
+        success_distance_m=0.004,
+        stuck_distance_m=0.0005,
+        stuck_time_s=window * PERIOD_S,
+        timeout_s=last * PERIOD_S,
+        force_limit_N=50.0,
+        force_time_s=1.5 * PERIOD_S,
+    )
+    x = np.cumsum([step for step, _ in samples])
+    force = np.array([value for _, value in samples])
+    k = np.arange(len(x))
+    back = np.where(k >= window, np.abs(x - x[np.maximum(k - window, 0)]), np.inf)
+    holds = {
+        "reached": np.abs(x - goal) < 0.004,
+        # Two samples in a row; there is nothing before the first.
+        "force": (force > 50.0) & (np.roll(force, 1) > 50.0) & (k > 1),
+        "stuck": back < 0.0005,
+        "timeout": k >= last,
+    }
+    ends = np.flatnonzero(np.any(list(holds.values()), axis=0))
+    expected = (
+        (next(name for name, held in holds.items() if held[ends[0]]), ends[0])
+        if len(ends)
+        else (None, k[-1])
+    )
+    monitor = StopMonitor(config, np.array([goal, 0.0, 0.0]), PERIOD_S)
+    for i in k:
+        outcome = monitor.update(i * PERIOD_S, np.array([x[i], 0.0, 0.0]), force[i])
+        if outcome is not None:
+            break
+    assert (outcome, i) == expected
+    assert monitor.min_distance == pytest.approx(np.abs(x[: i + 1] - goal).min(), abs=1e-12)
+
+
+@pytest.mark.parametrize("name", list(vars(StopConfig())))
+@pytest.mark.parametrize("value", [0.0, -1.0, float("nan")])
+def test_limits_must_be_positive(name: str, value: float) -> None:
+    with pytest.raises(ScenarioError, match=f"stop rule {name} must be positive, got {value}"):
+        StopConfig(**{name: value})
+
+
+def test_reaches_of_more_than_an_hour_are_refused() -> None:
+    assert StopConfig(timeout_s=3600.0).timeout_s == 3600.0
+    with pytest.raises(ScenarioError, match="timeout_s must be at most 3600, got inf"):
+        StopConfig(timeout_s=float("inf"))

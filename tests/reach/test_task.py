@@ -1,0 +1,115 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lic_drake.errors import ScenarioError
+from lic_drake.reach.scenario import load_scenario
+from lic_drake.reach.task import GoalArea, StartLine
+from lic_drake.robots.planar import planar_arm
+
+ARM = planar_arm()
+TASK = load_scenario("cylinder-clutter").task
+
+
+def test_the_start_grid_has_the_papers_21_initial_conditions() -> None:
+    # By hand from the joint limits: for each y the orientations of the 9 x 7 grid that remain.
+    possible = {
+        -0.4: [-30, 0],
+        -0.3: [-30, 0, 30],
+        -0.2: [0, 30, 60],
+        -0.1: [30, 60, 90],
+        0.0: [30, 60, 90],
+        0.1: [60, 90],
+        0.2: [60, 90],
+        0.3: [60, 90],
+        0.4: [90],
+    }
+    grid = TASK.start_line.grid(ARM)
+    assert grid.shape == (21, 3)
+    assert set(grid[:, 0]) == {TASK.start_line.x_m}
+    found = {(y, round(np.rad2deg(phi))) for _, y, phi in grid}
+    assert found == {(y, phi) for y, angles in possible.items() for phi in angles}
+
+
+def test_with_45_degrees_it_has_the_papers_14() -> None:
+    # Section IV-A, passage-clutter and apertures.
+    assert len(StartLine(phi_step_deg=45.0).grid(ARM)) == 14
+
+
+def test_the_goal_grid_has_the_papers_45_goals() -> None:
+    area = TASK.goal_area
+    grid = area.grid()
+    assert grid.shape == (45, 3)
+    x = [round(area.lower[0] + 0.1 * i, 12) for i in range(5)]
+    y = [-0.4, -0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3, 0.4]
+    assert [tuple(goal) for goal in grid] == [(xi, yi, 0.0) for xi in x for yi in y]
+
+
+def test_the_bounds_of_the_start_line_are_in_radians() -> None:
+    line = StartLine()
+    np.testing.assert_allclose(line.lower, [0.335, -0.4, -np.pi / 2])
+    np.testing.assert_allclose(line.upper, [0.335, 0.4, np.pi / 2])
+
+
+@given(
+    st.tuples(st.floats(-2, 2), st.floats(-2, 2)),
+    st.tuples(st.floats(0, 2), st.floats(0, 2)),
+    st.integers(0, 2**32),
+)
+def test_sampled_goals_lie_inside_the_area(
+    lower: tuple[float, float], edges: tuple[float, float], seed: int
+) -> None:
+    area = GoalArea(lower=list(lower), upper=[a + b for a, b in zip(lower, edges, strict=True)])
+    p_WG = area.sample(np.random.default_rng(seed))
+    assert p_WG.shape == (3,) and p_WG[2] == 0.0
+    assert np.all(p_WG[:2] >= area.lower) and np.all(p_WG[:2] <= area.upper)
+
+
+def test_sampled_goals_fill_the_area_evenly() -> None:
+    area = GoalArea(lower=[0.4, -0.4], upper=[0.8, 0.4])
+    rng = np.random.default_rng(0)
+    goals = np.array([area.sample(rng)[:2] for _ in range(4000)])
+    cells, _, _ = np.histogram2d(*goals.T, bins=4, range=[[0.4, 0.8], [-0.4, 0.4]])
+    # 16 cells of 250 expected draws; 5 standard deviations of a binomial count are 77.
+    assert np.all(np.abs(cells - 250.0) < 77.0)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"y_min_m": 0.5},
+        {"y_step_m": 0.0},
+        {"phi_step_deg": -30.0},
+        {"phi_max_deg": np.nan},
+        {"y_max_m": np.inf},
+        {"x_m": np.inf},
+        {"y_step_m": 1e-6},
+    ],
+)
+def test_impossible_start_lines_are_refused(values: dict[str, float]) -> None:
+    with pytest.raises(ScenarioError, match="start line"):
+        StartLine(**values)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"lower": [0.9, -0.4]},
+        {"lower": [0.4, np.nan]},
+        {"upper": [0.8]},
+        {"lower": [0.4, -0.4, 0.0]},
+        {"step_m": 0.0},
+        {"step_m": np.nan},
+        {"step_m": 1e-6},
+    ],
+)
+def test_impossible_goal_areas_are_refused(values: dict[str, float]) -> None:
+    with pytest.raises(ScenarioError, match="goal area"):
+        GoalArea(**values)
+
+
+def test_an_area_without_extent_is_a_single_goal() -> None:
+    area = GoalArea(lower=[0.6, 0.1], upper=[0.6, 0.1])
+    np.testing.assert_array_equal(area.grid(), [[0.6, 0.1, 0.0]])
+    np.testing.assert_array_equal(area.sample(np.random.default_rng(0)), [0.6, 0.1, 0.0])

@@ -1,0 +1,106 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lic_drake.reach.trace import MOVED_M, ReachTrace
+
+PERIOD_S = 0.04
+
+
+def trace_of(positions: np.ndarray, forces: np.ndarray | None = None) -> ReachTrace:
+    """A trace of tip positions in the plane, shape (n, 2), a control period apart."""
+    trace = ReachTrace()
+    for k, (x, y) in enumerate(positions):
+        force = np.zeros(3) if forces is None else forces[k]
+        trace.append(k * PERIOD_S, np.zeros(3), np.array([x, y, 0.0]), force)
+    return trace
+
+
+def moving(times: np.ndarray, vx: float, vy: float) -> np.ndarray:
+    return np.column_stack([vx * times, vy * times])
+
+
+@given(st.floats(-1, 1), st.floats(-1, 1), st.integers(1, 200))
+def test_a_constant_velocity_is_the_final_velocity(vx: float, vy: float, steps: int) -> None:
+    times = PERIOD_S * np.arange(steps + 1)
+    velocity = trace_of(moving(times, vx, vy)).final_velocity(still_s=0.0)
+    np.testing.assert_allclose(velocity, [vx, vy, 0.0], atol=1e-12)
+
+
+def test_only_the_last_second_of_motion_counts() -> None:
+    # 3 s along x, then 2 s along y.
+    times = PERIOD_S * np.arange(126)
+    path = np.column_stack([0.1 * np.minimum(times, 3.0), 0.2 * np.maximum(times - 3.0, 0.0)])
+    trace = trace_of(path)
+    np.testing.assert_allclose(trace.final_velocity(0.0), [0.0, 0.2, 0.0], atol=1e-12)
+    np.testing.assert_allclose(trace.final_velocity(0.0, 4.0), [0.05, 0.1, 0.0], atol=1e-12)
+
+
+def test_the_stuck_window_is_left_out() -> None:
+    # 3 s of motion, then 4 s at rest, as the stuck rule leaves a reach.
+    times = PERIOD_S * np.arange(176)
+    trace = trace_of(moving(np.minimum(times, 3.0), 0.1, -0.05))
+    np.testing.assert_allclose(trace.final_velocity(4.0), [0.1, -0.05, 0.0], atol=1e-12)
+    np.testing.assert_array_equal(trace.final_velocity(0.0), np.zeros(3))
+
+
+def test_on_a_circle_the_mean_velocity_is_the_chord() -> None:
+    # Radius 0.3 m, 1 rad/s: over the last second the chord is 2 r sin(1/2).
+    times = PERIOD_S * np.arange(101)
+    path = 0.3 * np.column_stack([np.cos(times), np.sin(times)])
+    velocity = trace_of(path).final_velocity(0.0)
+    assert np.linalg.norm(velocity) == pytest.approx(0.6 * np.sin(0.5))
+    chord = 0.3 * (np.array([np.cos(4.0), np.sin(4.0)]) - [np.cos(3.0), np.sin(3.0)])
+    np.testing.assert_allclose(velocity[:2], chord)
+
+
+def test_a_reach_shorter_than_the_window_uses_all_of_it() -> None:
+    velocity = trace_of(moving(PERIOD_S * np.arange(6), 0.5, 0.0)).final_velocity(0.0)
+    np.testing.assert_allclose(velocity, [0.5, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("still_s", [0.0, 4.0])
+def test_without_motion_before_the_stuck_window_there_is_no_velocity(still_s: float) -> None:
+    np.testing.assert_array_equal(trace_of(np.ones((1, 2))).final_velocity(still_s), np.zeros(3))
+    never_moved = trace_of(np.ones((101, 2)))
+    np.testing.assert_array_equal(never_moved.final_velocity(still_s), np.zeros(3))
+
+
+def test_forces_are_kept_as_peak_sum_and_number_of_loaded_taxels() -> None:
+    forces = np.array([[0.0, 0.0, 0.0], [3.0, 1.0, 0.0], [0.0, 0.0, 8.0]])
+    trace = trace_of(np.zeros((3, 2)), forces)
+    assert trace.peak_force == [0.0, 3.0, 8.0]
+    assert trace.total_force == [0.0, 4.0, 8.0]
+    assert trace.contacts == [0, 2, 1]
+    # 12 N on three loaded taxels.
+    assert trace.mean_force == 4.0
+
+
+def test_without_contact_the_mean_force_is_zero() -> None:
+    assert trace_of(np.zeros((5, 2))).mean_force == 0.0
+
+
+def test_the_outermost_object_is_one_that_was_moved() -> None:
+    trace = ReachTrace()
+    start = np.array([0.5, 0.0, 0.0, 2.0])
+    trace.follow(start)
+    assert trace.outermost_m == 0.0
+    trace.follow(start + [0.1, 0.0, 0.0, 0.0])
+    assert trace.outermost_m == pytest.approx(0.6)
+    # It stays the outermost when it comes back, and less than MOVED_M is no motion.
+    trace.follow(start + [0.05, 0.0, 0.0, 0.9 * MOVED_M])
+    assert trace.outermost_m == pytest.approx(0.6)
+    trace.follow(start + [0.0, 0.0, 0.0, -1.5])
+    assert trace.outermost_m == pytest.approx(0.6)
+    trace.follow(start + [0.0, 0.0, 0.0, 0.5])
+    assert trace.outermost_m == pytest.approx(2.5)
+
+
+def test_the_first_positions_are_a_copy() -> None:
+    trace = ReachTrace()
+    positions = np.array([0.5, 0.0])
+    trace.follow(positions)
+    positions[0] = 0.7
+    trace.follow(positions)
+    assert trace.outermost_m == pytest.approx(0.7)

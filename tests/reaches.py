@@ -1,0 +1,52 @@
+"""Real reaches for tests: small scenarios, requests for them, and where a hand can start."""
+
+import numpy as np
+
+from lic_drake.reach.request import ReachRequest
+from lic_drake.reach.scenario import Scenario, load_scenario
+
+START_Y_M, START_PHI_DEG = 0.0, 60.0
+"""A start of the grid from which a goal straight ahead is easy."""
+
+
+def free_space(timeout_s: float = 20.0) -> Scenario:
+    """The shipped scenario without any clutter."""
+    return load_scenario(
+        "cylinder-clutter",
+        "{clutter: {num_movable: 0, num_fixed: 0},"
+        f" stop: {{timeout_s: {timeout_s}, force_limit_N: 100}}}}",
+    )
+
+
+def small_clutter(timeout_s: float = 3.0) -> Scenario:
+    """Twelve cylinders where the arm meets them soon."""
+    return load_scenario(
+        "cylinder-clutter",
+        "{clutter: {num_movable: 6, num_fixed: 6, lower: [0.4, -0.3], upper: [0.7, 0.3]},"
+        f" stop: {{timeout_s: {timeout_s}, force_limit_N: 100}}}}",
+    )
+
+
+def reach_request(
+    scenario: Scenario,
+    goal: tuple[float, float] = (0.6, 0.1),
+    y_m: float = START_Y_M,
+    phi_deg: float = START_PHI_DEG,
+    environment: int = 0,
+    stream: str = "training",
+) -> ReachRequest:
+    """A request with the start on the start line."""
+    return ReachRequest(
+        scenario=scenario,
+        stream=stream,
+        environment=environment,
+        goal=(goal[0], goal[1], 0.0),
+        start=(scenario.task.start_line.x_m, y_m, float(np.deg2rad(phi_deg))),
+    )
+
+
+def start_angles(scenario: Scenario) -> np.ndarray:
+    """Joint angles of the easy start, shape (3,), radians."""
+    q = scenario.arm().solve_ik(np.array(reach_request(scenario).start))
+    assert q is not None
+    return q
