@@ -1,6 +1,7 @@
 """Whether a point is the optimum of a quadratic program, without a solver."""
 
 import numpy as np
+from scipy.optimize import linprog, lsq_linear
 
 from lic_drake.control.quadratic_program import QuadraticProgram
 
@@ -15,8 +16,7 @@ def violation(problem: QuadraticProgram, x: np.ndarray) -> float:
 def kkt_residual(problem: QuadraticProgram, x: np.ndarray, active: float = 1e-7) -> float:
     """How far the cost's gradient is from the cone of the active limits' normals, relative.
 
-    The multipliers come from a non-negative fit by projected coordinate descent, not from the
-    solver under test.
+    The multipliers come from a bounded least-squares fit, not from the solver under test.
     """
     gradient = problem.P @ x + problem.c
     rows, low, high = _all_rows(problem)
@@ -30,17 +30,29 @@ def kkt_residual(problem: QuadraticProgram, x: np.ndarray, active: float = 1e-7)
         ]
     )
     scale = np.linalg.norm(gradient) + np.linalg.norm(problem.c)
-    multipliers = np.zeros(len(inward))
-    residual = gradient.copy()
-    for _ in range(20_000):
-        before = multipliers.copy()
-        for i, row in enumerate(inward):
-            multiplier = max(0.0, multipliers[i] + row @ residual)
-            residual -= (multiplier - multipliers[i]) * row
-            multipliers[i] = multiplier
-        if np.max(np.abs(multipliers - before), initial=0.0) < 1e-13 * scale:
-            break
-    return float(np.linalg.norm(residual) / scale)
+    if len(inward) == 0:
+        return float(np.linalg.norm(gradient) / scale)
+    fit = lsq_linear(inward.T, gradient, (0.0, np.inf), "bvls")
+    return float(np.linalg.norm(inward.T @ fit.x - gradient) / scale)
+
+
+def largest_margin(problem: QuadraticProgram) -> float:
+    """By how much all limits, of rows scaled to 1, can be kept at once; negative if they cannot."""
+    rows, low, high = _all_rows(problem)
+    norms = np.linalg.norm(rows, axis=1)
+    rows, low, high = (item[norms > 1e-9] for item in (rows, low, high))
+    norms = norms[norms > 1e-9]
+    units, low, high = rows / norms[:, None], low / norms, high / norms
+    left = np.vstack([units[np.isfinite(high)], -units[np.isfinite(low)]])
+    right = np.concatenate([high[np.isfinite(high)], -low[np.isfinite(low)]])
+    free = [(None, None)] * rows.shape[1]
+    result = linprog(
+        np.append(np.zeros(rows.shape[1]), -1.0),
+        np.column_stack([left, np.ones(len(left))]),
+        right,
+        bounds=[*free, (None, 1.0)],
+    )
+    return float(-result.fun)
 
 
 def _all_rows(problem: QuadraticProgram) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

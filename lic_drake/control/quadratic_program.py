@@ -15,8 +15,11 @@ from scipy.optimize import nnls
 
 Vector = NDArray[np.float64]
 
-_INFEASIBLE = 1e-11
-"""A residual of the dual problem below this means that the constraints contradict each other."""
+_SCALES = (1.0, 1e3, 1e6)
+"""Units for distances, tried in turn: the dual problem resolves up to about 1e4 of one."""
+
+_TOLERANCE = 1e-8
+"""An answer keeps its limits to this part of its distance, or there is none."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,6 +48,8 @@ class QuadraticProgram:
 def solve(problem: QuadraticProgram) -> Vector | None:
     """Returns the minimiser, shape (n,), or None when the constraints contradict each other.
 
+    Where they leave no more than a single point, rounding decides between it and None.
+
     Raises:
         numpy.linalg.LinAlgError: P is not positive definite.
     """
@@ -66,14 +71,17 @@ def solve(problem: QuadraticProgram) -> Vector | None:
 
 def _nearest_to_origin(G: Vector, h: Vector) -> Vector | None:
     """Returns the shortest y with G y >= h, rows of G of unit length, or None."""
-    scale = np.max(h, initial=0.0)
-    if scale <= 0.0:
+    worst = np.max(h, initial=0.0)
+    if worst <= 0.0:
         return np.zeros(G.shape[1])
-    E = np.vstack([G.T, h / scale])
     f = np.append(np.zeros(G.shape[1]), 1.0)
-    multipliers, _ = nnls(E, f, maxiter=100 * len(h))
-    residual = E @ multipliers - f
-    if -residual[-1] < _INFEASIBLE:
-        return None
-    y: Vector = -scale * residual[:-1] / residual[-1]
-    return y
+    for unit in worst * np.array(_SCALES):
+        E = np.vstack([G.T, h / unit])
+        multipliers, _ = nnls(E, f, maxiter=100 * len(h))
+        residual = E @ multipliers - f
+        # The residual is zero, but for rounding, when the constraints contradict each other.
+        if residual[-1] < 0.0:
+            y: Vector = -unit * residual[:-1] / residual[-1]
+            if np.all(G @ y >= h - _TOLERANCE * max(worst, float(np.linalg.norm(y)))):
+                return y
+    return None

@@ -24,6 +24,22 @@ PAUSE_S = 1.0
 """Time between two reaches of a recording, at least."""
 
 
+MAX_FRAMES_PER_SECOND = 30.0
+"""A recording has no more frames a second."""
+
+
+def frame_rate(control_rate_hz: float) -> float:
+    """Returns the frames per second of a recording: the control rate, halved while too high.
+
+    The integrator stops where a frame is drawn; in other instants than the controller's this
+    would change the reach. Halves keep the instants equal to the last bit.
+    """
+    rate = control_rate_hz
+    while rate > MAX_FRAMES_PER_SECOND:
+        rate /= 2.0
+    return rate
+
+
 class ReachRecording:
     """A Meshcat scene of one environment in which reaches are recorded one after another.
 
@@ -31,11 +47,10 @@ class ReachRecording:
     too, but as scenery. Must be used from the thread that made it.
     """
 
-    def __init__(
-        self, scenario: Scenario, instance: ClutterInstance, frames_per_second: float = 20.0
-    ) -> None:
+    def __init__(self, scenario: Scenario, instance: ClutterInstance) -> None:
         self._scenario = scenario
         self._meshcat = Meshcat(MeshcatParams(show_stats_plot=False))
+        frames_per_second = frame_rate(scenario.mpc.rate_hz)
         keep = select_near(instance, scenario.arm().reach_m)
         self._diagram = make_reach_diagram(
             scenario, take(instance, keep), self._meshcat, frames_per_second

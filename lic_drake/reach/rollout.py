@@ -112,6 +112,7 @@ def simulate(
             integration_scheme="cenic",
             accuracy=scenario.scene.cenic_accuracy,
             max_step_size=scenario.scene.cenic_max_step_s,
+            start_time=first * period_s,
         )
         ApplySimulatorConfig(simulator_config, simulator)
     step = 0

@@ -63,8 +63,8 @@ class GoalArea:
     """Rectangle of goals p_WG with its training grid (paper: 0.4 x 0.8 m, 5 x 9 at 0.1 m)."""
 
     # Corners (x, y) in W and grid distance, metres.
-    lower: list[float] = field(default_factory=lambda: [0.4, -0.4])
-    upper: list[float] = field(default_factory=lambda: [0.8, 0.4])
+    lower: list[float] = field(default_factory=lambda: [0.45, -0.4])
+    upper: list[float] = field(default_factory=lambda: [0.85, 0.4])
     step_m: float = 0.1
 
     def __post_init__(self) -> None:
