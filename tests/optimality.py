@@ -40,8 +40,10 @@ def largest_margin(problem: QuadraticProgram) -> float:
     """By how much all limits, of rows scaled to 1, can be kept at once; negative if they cannot."""
     rows, low, high = _all_rows(problem)
     norms = np.linalg.norm(rows, axis=1)
-    rows, low, high = (item[norms > 1e-9] for item in (rows, low, high))
-    norms = norms[norms > 1e-9]
+    empty = norms < 1e-9
+    if np.any(low[empty] > 0.0) or np.any(high[empty] < 0.0):
+        return -np.inf
+    rows, low, high, norms = (item[~empty] for item in (rows, low, high, norms))
     units, low, high = rows / norms[:, None], low / norms, high / norms
     left = np.vstack([units[np.isfinite(high)], -units[np.isfinite(low)]])
     right = np.concatenate([high[np.isfinite(high)], -low[np.isfinite(low)]])

@@ -24,6 +24,9 @@ PAUSE_S = 1.0
 """Time between two reaches of a recording, at least."""
 
 
+TICKS_PER_FRAME = 10
+"""Meshcat rounds a frame's time down to ticks; with one a frame, some fell on the one before."""
+
 MAX_FRAMES_PER_SECOND = 30.0
 """A recording has no more frames a second."""
 
@@ -62,7 +65,9 @@ class ReachRecording:
         self._meshcat.SetProperty("/Grid", "visible", False)
         self._meshcat.SetProperty("/Axes", "visible", False)
         self._meshcat.SetCameraPose(np.array([-0.55, -0.45, 1.35]), np.array([0.42, 0.05, 0.0]))
-        self._meshcat.StartRecording(frames_per_second, set_visualizations_while_recording=False)
+        self._meshcat.StartRecording(
+            TICKS_PER_FRAME * frames_per_second, set_visualizations_while_recording=False
+        )
         self._clock_s = 0.0
 
     def add_reach(self, q0: Vector, p_WG: Vector) -> tuple[str, ReachTrace, str, float]:

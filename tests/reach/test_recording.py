@@ -17,7 +17,7 @@ from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.trace import ReachTrace
 
-FRAMES_PER_SECOND = 25
+TICKS_PER_SECOND = 250
 P_WG = np.array([0.6, 0.1, 0.0])
 LAST_LINK = b"/drake/visualizer/planar_arm/link3"
 
@@ -30,7 +30,7 @@ def animation_of(html: str) -> bytes:
 
 
 def positions_of(animation: bytes, path: bytes) -> dict[int, np.ndarray]:
-    """Recorded positions of an object, frame -> (x, y, z), read from the msgpack bytes."""
+    """Recorded positions of an object, tick -> (x, y, z), read from the msgpack bytes."""
     track = animation[animation.index(path) :]
     track = track[: track.index(b".quaternion")]
     # {"time": n, "value": [x, y, z]}: n in 1, 2 or 3 bytes, the others as doubles.
@@ -61,13 +61,15 @@ def test_the_frames_show_the_arm_where_it_was(recorded: tuple[list[ReachTrace], 
     kinematics = free_space().arm().kinematics
     begin = 0
     for trace in traces:
-        # 25 samples and 25 frames a second; no more is published at the instant of the end.
-        for k, q in enumerate(trace.q[:-1]):
-            p_WL = [*kinematics.link_origins(q)[2], 0.0]
-            np.testing.assert_allclose(frames[begin + k], p_WL, atol=1e-9)
+        # 25 samples a second and as many frames, at their tick or, by rounding, the one before.
+        for k, q in enumerate(trace.q):
+            tick = begin + 10 * k
+            assert (tick in frames) != (tick - 1 in frames)
+            frame = frames[tick] if tick in frames else frames[tick - 1]
+            np.testing.assert_allclose(frame, [*kinematics.link_origins(q)[2], 0.0], atol=1e-9)
         # The next reach begins at a whole second, after a pause.
-        begin += FRAMES_PER_SECOND * round(trace.time_s[-1] + PAUSE_S)
-    assert len(frames) >= 2 * FRAMES_PER_SECOND
+        begin += TICKS_PER_SECOND * round(trace.time_s[-1] + PAUSE_S)
+    assert len(frames) == 2 * 26
 
 
 def test_it_shows_the_objects_that_the_simulation_leaves_out(
@@ -95,7 +97,7 @@ def test_it_plays_offline(recorded: tuple[list[ReachTrace], str]) -> None:
 @pytest.mark.parametrize("environment", [0, 1])
 def test_a_recorded_reach_is_the_simulated_one(environment: int) -> None:
     scenario = small_clutter(2.5)
-    request = reach_request(scenario, (0.7, 0.0), -0.1, 60.0, environment=environment)
+    request = reach_request(scenario, (0.7, 0.0), 0.0, 90.0, environment=environment)
     expected = run_reach(request)
     assert expected.peak_contacts > 0
     recording = ReachRecording(scenario, scenario.sample_instance("training", environment))
