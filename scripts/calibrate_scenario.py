@@ -11,12 +11,10 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from lic_drake.evaluate.experiment import simulate_requests
+from lic_drake.evaluate.batch import random_requests, simulate_requests
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.intervals import wilson_interval
-from lic_drake.reach.request import ReachRequest
 from lic_drake.reach.scenario import load_scenario
-from lic_drake.seeds import make_generator
 
 PAPER = 61.0
 GOALS = 10
@@ -30,22 +28,7 @@ def main() -> int:
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     args = parser.parse_args()
     scenario = load_scenario(args.scenario)
-    starts = scenario.task.start_line.grid(scenario.arm())
-    requests = []
-    for environment in range(args.environments):
-        for goal in range(GOALS):
-            p_WG = scenario.sample_goal("training", environment, goal)
-            rng = make_generator("training", "rnd", environment, goal)
-            x0 = starts[rng.integers(len(starts))]
-            requests.append(
-                ReachRequest(
-                    scenario=scenario,
-                    stream="training",
-                    environment=environment,
-                    goal=(float(p_WG[0]), float(p_WG[1]), 0.0),
-                    start=(float(x0[0]), float(x0[1]), float(x0[2])),
-                )
-            )
+    requests = random_requests(scenario, "training", args.environments, GOALS)
     library = ExperienceLibrary(args.results)
     library.create()
     found = simulate_requests(requests, library, scenario, args.workers, print)

@@ -13,12 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
-from lic_drake.evaluate.experiment import mcnemar, simulate_requests
+from lic_drake.evaluate.batch import random_requests, simulate_requests
+from lic_drake.evaluate.experiment import mcnemar
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.intervals import wilson_interval
-from lic_drake.reach.request import ReachRecord, ReachRequest
-from lic_drake.reach.scenario import Scenario, load_scenario
-from lic_drake.seeds import make_generator
+from lic_drake.reach.request import ReachRecord
+from lic_drake.reach.scenario import load_scenario
 
 VARIANTS = {
     "discrete, 0.5 ms": "{scene: {time_step_s: 0.0005}}",
@@ -34,34 +34,13 @@ VARIANTS = {
 REFERENCE = "discrete, 0.5 ms"
 
 
-def random_requests(scenario: Scenario, reaches: int) -> list[ReachRequest]:
-    """Returns requests with random goals and starts, five to an environment."""
-    starts = scenario.task.start_line.grid(scenario.arm())
-    requests = []
-    for i in range(reaches):
-        environment, goal = divmod(i, 5)
-        p_WG = scenario.sample_goal("calibration", environment, goal)
-        rng = make_generator("calibration", "rnd", environment, goal)
-        x0 = starts[rng.integers(len(starts))]
-        requests.append(
-            ReachRequest(
-                scenario=scenario,
-                stream="calibration",
-                environment=environment,
-                goal=(float(p_WG[0]), float(p_WG[1]), 0.0),
-                start=(float(x0[0]), float(x0[1]), float(x0[2])),
-            )
-        )
-    return requests
-
-
 def run_variant(name: str, args: argparse.Namespace) -> list[ReachRecord]:
     """Returns the records of a variant, in the order of the requests."""
     scenario = load_scenario("cylinder-clutter", VARIANTS[name])
     folder = args.results / "".join(c if c.isalnum() else "-" for c in name).strip("-")
     library = ExperienceLibrary(folder)
     library.create()
-    requests = random_requests(scenario, args.reaches)
+    requests = random_requests(scenario, "calibration", -(-args.reaches // 5), 5)[: args.reaches]
     records = simulate_requests(
         requests, library, scenario, args.workers, lambda line: print(f"{name}: {line}")
     )

@@ -77,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
     import numpy as np
 
     from lic_drake.errors import RequestError
-    from lic_drake.reach.request import ReachRequest, check_goal
+    from lic_drake.reach.request import check_goal, make_request
     from lic_drake.reach.rollout import run_reach
     from lic_drake.reach.scenario import load_scenario
 
@@ -89,13 +89,7 @@ def run(args: argparse.Namespace) -> int:
         raise RequestError(
             f"a start is two finite numbers, got y {args.start_y} m, phi {args.start_phi} degrees"
         )
-    request = ReachRequest(
-        scenario=scenario,
-        stream=args.stream,
-        environment=args.environment,
-        goal=(float(p_WG[0]), float(p_WG[1]), 0.0),
-        start=(float(x0[0]), float(x0[1]), float(x0[2])),
-    )
+    request = make_request(scenario, args.stream, args.environment, p_WG, x0)
     if args.diagram is not None:
         _draw(request, args.diagram)
     record = run_reach(request)

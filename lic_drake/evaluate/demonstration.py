@@ -17,7 +17,7 @@ from lic_drake.evaluate.plots import draw_density, draw_top_view, save_figure
 from lic_drake.evaluate.trial import Attempt, planar_arm_of
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.recording import ReachRecording
-from lic_drake.reach.request import ReachRequest
+from lic_drake.reach.request import make_request
 from lic_drake.reach.rollout import make_record
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.trace import ReachTrace
@@ -96,13 +96,7 @@ def demonstrate(
             f" {np.rad2deg(selection.x0[2]):+.1f} degrees{estimate}"
             f" (chosen in {selection.seconds:.2f} s)"
         )
-        request = ReachRequest(
-            scenario=scenario,
-            stream="evaluation",
-            environment=seed,
-            goal=(float(p_WG[0]), float(p_WG[1]), float(p_WG[2])),
-            start=(float(selection.x0[0]), float(selection.x0[1]), float(selection.x0[2])),
-        )
+        request = make_request(scenario, "evaluation", seed, p_WG, selection.x0)
         outcome, trace, detail, wall_time_s = recording.add_reach(selection.q, p_WG)
         record = make_record(request, outcome, trace, detail, wall_time_s)
         say(

@@ -1,29 +1,22 @@
 """Trials of several strategies on the same unseen environments, resumable."""
 
-import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import binomtest
 
+from lic_drake.evaluate.batch import simulate_requests
 from lic_drake.evaluate.trial import planar_arm_of
 from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.experience.workers import prepare_worker
 from lic_drake.intervals import wilson_interval
-from lic_drake.reach.request import ReachRecord, ReachRequest
-from lic_drake.reach.rollout import run_reach
+from lic_drake.reach.request import ReachRecord, ReachRequest, make_request
 from lic_drake.reach.scenario import Scenario
 from lic_drake.seeds import make_generator
 from lic_drake.select.registry import make_selector, needs_library
 from lic_drake.select.situation import Selection, Situation, StartSet
-
-CHUNK = 20
-"""Reaches to a shard: what an interruption can lose at the most, for each worker."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,7 +91,10 @@ def run_trials(
                 failed = tuple(selection.x0 for selection in trial.selections)
                 situation = Situation(p_WG=p_WG, starts=starts, failed=failed)
                 selection = selector.select(situation)
-                chosen.append((trial, selection, _request(scenario, trial, p_WG, selection)))
+                request = make_request(
+                    scenario, "evaluation", trial.environment, p_WG, selection.x0
+                )
+                chosen.append((trial, selection, request))
         say(f"attempt {attempt + 1}: {len(chosen)} starts chosen")
         records = simulate_requests([c[2] for c in chosen], library, scenario, workers, say)
         extended = {
@@ -113,41 +109,6 @@ def run_trials(
         }
         trials = [extended.get((t.method, t.environment, t.goal), t) for t in trials]
     return trials
-
-
-def simulate_requests(
-    requests: Sequence[ReachRequest],
-    library: ExperienceLibrary,
-    scenario: Scenario,
-    workers: int,
-    say: Callable[[str], None],
-) -> dict[str, ReachRecord]:
-    """Returns the records of requests by key, simulating those that the library lacks."""
-    records = {record.key: record for record in library.records()} if _has_rows(library) else {}
-    missing = list({r.key: r for r in requests if r.key not in records}.values())
-    missing.sort(key=lambda request: request.environment)
-    chunks = [missing[i : i + CHUNK] for i in range(0, len(missing), CHUNK)]
-    executor = ProcessPoolExecutor(
-        workers, mp_context=get_context("forkserver"), initializer=prepare_worker
-    )
-    began = time.perf_counter()
-    done = successes = 0
-    try:
-        for future in as_completed([executor.submit(_run_chunk, chunk) for chunk in chunks]):
-            rows = future.result()
-            library.write_shard(f"reaches-{rows[0].key}", rows, scenario)
-            records.update({row.key: row for row in rows})
-            done += len(rows)
-            successes += sum(row.success for row in rows)
-            elapsed = time.perf_counter() - began
-            say(
-                f"  {done}/{len(missing)} reaches, {successes} at the goal,"
-                f" {60 * done / elapsed:.0f} a minute,"
-                f" {elapsed * (len(missing) - done) / done:.0f} s left; kept in {library.path}"
-            )
-    finally:
-        executor.shutdown(cancel_futures=True)
-    return records
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -215,24 +176,3 @@ def format_rates(rates: Sequence[Rate]) -> str:
             f" {100 * low:.1f}..{100 * high:.1f} | {rate.trials} | {p} |"
         )
     return "\n".join(lines) + "\n"
-
-
-def _request(
-    scenario: Scenario, trial: Trial, p_WG: NDArray[np.float64], selection: Selection
-) -> ReachRequest:
-    x0 = selection.x0
-    return ReachRequest(
-        scenario=scenario,
-        stream="evaluation",
-        environment=trial.environment,
-        goal=(float(p_WG[0]), float(p_WG[1]), float(p_WG[2])),
-        start=(float(x0[0]), float(x0[1]), float(x0[2])),
-    )
-
-
-def _run_chunk(requests: list[ReachRequest]) -> list[ReachRecord]:
-    return [run_reach(request) for request in requests]
-
-
-def _has_rows(library: ExperienceLibrary) -> bool:
-    return bool(library.shard_paths())

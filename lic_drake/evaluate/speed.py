@@ -5,12 +5,11 @@ from dataclasses import asdict, dataclass
 from statistics import median
 from typing import Any
 
-import numpy as np
 from pydrake.systems.analysis import Simulator
 
 from lic_drake.control.mpc_controller import HapticMpcController
 from lic_drake.control.tactile_sensor import TactileSensor
-from lic_drake.reach.request import ReachRequest
+from lic_drake.evaluate.batch import random_requests
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario
 
@@ -79,9 +78,8 @@ def measure_reaches(scenario: Scenario, reaches: int, per_environment: int = 5) 
         reaches: How many reaches to time.
         per_environment: How many of them share an environment.
     """
-    starts = scenario.task.start_line.grid(scenario.arm())
-    records = []
-    rng = np.random.default_rng(0)
+    environments = -(-reaches // per_environment)
+    requests = random_requests(scenario, "calibration", environments, per_environment)[:reaches]
     # Diagrams bind the methods when they are built, so the watches go on before the first one.
     with (
         _Stopwatch(TactileSensor, "_calc_taxel_force") as sensor,
@@ -89,21 +87,7 @@ def measure_reaches(scenario: Scenario, reaches: int, per_environment: int = 5) 
         _Stopwatch(Simulator, "AdvanceTo") as stepping,
     ):
         began = time.perf_counter()
-        for i in range(reaches):
-            environment, goal_index = divmod(i, per_environment)
-            p_WG = scenario.sample_goal("calibration", environment, goal_index)
-            x0 = starts[rng.integers(len(starts))]
-            records.append(
-                run_reach(
-                    ReachRequest(
-                        scenario=scenario,
-                        stream="calibration",
-                        environment=environment,
-                        goal=(float(p_WG[0]), float(p_WG[1]), float(p_WG[2])),
-                        start=(float(x0[0]), float(x0[1]), float(x0[2])),
-                    )
-                )
-            )
+        records = [run_reach(request) for request in requests]
         total = time.perf_counter() - began
     moving = [record for record in records if record.duration_s > 0.0]
     # The stop rules ask for the taxel forces first; the controller finds them in Drake's cache.

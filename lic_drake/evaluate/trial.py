@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lic_drake.errors import RequestError
-from lic_drake.reach.request import ReachRecord, ReachRequest
+from lic_drake.reach.request import ReachRecord, ReachRequest, make_request
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario
 from lic_drake.robots.planar import PlanarArm
@@ -61,13 +61,7 @@ def run_trial(
     for _ in range(attempts):
         failed = tuple(attempt.selection.x0 for attempt in done)
         selection = selector.select(Situation(p_WG=p_WG, starts=starts, failed=failed))
-        request = ReachRequest(
-            scenario=scenario,
-            stream=stream,
-            environment=environment,
-            goal=(float(p_WG[0]), float(p_WG[1]), float(p_WG[2])),
-            start=(float(selection.x0[0]), float(selection.x0[1]), float(selection.x0[2])),
-        )
+        request = make_request(scenario, stream, environment, p_WG, selection.x0)
         done.append(Attempt(selection=selection, request=request, record=run_reach(request)))
         if done[-1].record.success:
             break

@@ -40,6 +40,23 @@ class ReachRequest:
         return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
 
 
+def make_request(
+    scenario: Scenario,
+    stream: str,
+    environment: int,
+    p_WG: NDArray[np.float64],
+    x0: NDArray[np.float64],
+) -> ReachRequest:
+    """Returns a request from arrays: goal p_WG, shape (3,), and start pose x0, shape (3,)."""
+    return ReachRequest(
+        scenario=scenario,
+        stream=stream,
+        environment=environment,
+        goal=(float(p_WG[0]), float(p_WG[1]), float(p_WG[2])),
+        start=(float(x0[0]), float(x0[1]), float(x0[2])),
+    )
+
+
 @dataclass(frozen=True, kw_only=True)
 class ReachRecord:
     """One row of an experience library. SI units, radians, world frame W.

@@ -71,7 +71,12 @@ class SceneConfig:
                 f"contact_approximation must be one of {', '.join(CONTACT_APPROXIMATIONS)},"
                 f" got {self.contact_approximation!r}"
             )
-        for name in ("cenic_accuracy", "ground_friction_N", "ground_creep_m_per_s"):
+        for name in (
+            "cenic_accuracy",
+            "cenic_max_step_s",
+            "ground_friction_N",
+            "ground_creep_m_per_s",
+        ):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0.0):
                 raise ScenarioError(f"{name} must be a positive number, got {value}")

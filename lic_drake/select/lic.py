@@ -92,29 +92,42 @@ class LicSelector:
 
 
 class LbfgsbSelector(LicSelector):
-    """The paper's own optimiser: L-BFGS-B over (y, phi) within the start line's bounds (III-E).
+    """The paper's own optimiser: L-BFGS-B, which knows bounds only (III-E).
 
-    A pose that the arm cannot take ends a line search as a value below all probabilities.
+    The orientations that the joint limits leave depend on the position, so it works on
+    (y, s) with phi = low(y) + s (high(y) - low(y)) and s from 0 to 1.
     """
 
     def _improve(self, situation: Situation, guess: Vector) -> Vector | None:
-        line = situation.starts.line
+        starts = situation.starts
         low, high = next(
             (low, high)
             for low, high in situation.free_intervals()
             if low - 1e-5 <= guess[1] <= high + 1e-5
         )
 
-        def cost(y_phi: Vector) -> tuple[float, Vector]:
-            x0 = np.array([line.x_m, y_phi[0], y_phi[1]])
-            if self._arm.solve_ik(x0) is None:
-                return 1.0, np.zeros(2)
-            value, by_z = self._estimator.value_and_gradient(
-                self._features.join(situation.p_WG, x0)
-            )
-            return -value, -self._features.gradient_by_x0(by_z)[1:]
+        def pose(y_s: Vector) -> tuple[Vector, Vector]:
+            """Returns x0 and its derivative by (y, s), shape (3, 2)."""
+            ends, slopes = starts.phi_range(y_s[0])
+            width, d_width = ends[1] - ends[0], slopes[1] - slopes[0]
+            x0 = np.array([starts.line.x_m, y_s[0], ends[0] + y_s[1] * width])
+            by_y_s = np.array([[0.0, 0.0], [1.0, 0.0], [slopes[0] + y_s[1] * d_width, width]])
+            return x0, by_y_s
 
-        bounds = [(low, high), (line.lower[2], line.upper[2])]
-        result = minimize(cost, guess[1:], jac=True, method="L-BFGS-B", bounds=bounds)
-        x0 = np.array([line.x_m, *result.x])
-        return x0 if situation.starts.contains(x0) else None
+        def cost(y_s: Vector) -> tuple[float, Vector]:
+            x0, by_y_s = pose(y_s)
+            z = self._features.join(situation.p_WG, x0)
+            value, by_z = self._estimator.value_and_gradient(z)
+            return -value, -self._features.gradient_by_x0(by_z) @ by_y_s
+
+        ends, _ = starts.phi_range(guess[1])
+        share = (guess[2] - ends[0]) / max(ends[1] - ends[0], 1e-9)
+        result = minimize(
+            cost,
+            np.array([guess[1], np.clip(share, 0.0, 1.0)]),
+            jac=True,
+            method="L-BFGS-B",
+            bounds=[(low, high), (0.0, 1.0)],
+        )
+        x0, _ = pose(result.x)
+        return x0 if starts.contains(x0) else None

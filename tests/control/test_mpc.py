@@ -141,7 +141,7 @@ def test_the_cost_is_that_of_the_published_problem(
     config, problem = mpc.config, mpc.make_problem(state)
 
     def published(dphi: np.ndarray) -> float:
-        # testbed: |dx_d - J_E S dphi|^2 + alpha dphi' K^2 dphi
+        # |dx_d - J_E S dphi|^2 + alpha dphi' K^2 dphi
         #          + w / n_o sum |K_i J_i S dphi + delta n_i|^2
         contact_stiffness = [
             config.contact_stiffness_N_per_m * np.outer(n, n) for n in state.normals
@@ -154,7 +154,7 @@ def test_the_cost_is_that_of_the_published_problem(
         cost = np.sum((mpc.wanted_tip_motion(state.p_EG) - state.Jv_E @ S @ dphi) ** 2)
         cost += config.torque_change_weight * np.sum((K * dphi) ** 2)
         over = [i for i, force in enumerate(state.forces) if force > 5.0]
-        share = len(over) if config is not None and config.force_weight_shared else 1
+        share = len(over) if config.force_weight_shared else 1
         for i in over:
             change_of_force = contact_stiffness[i] @ state.Jv_C[i] @ S @ dphi
             wanted = config.force_decrease_N * state.normals[i]

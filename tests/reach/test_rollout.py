@@ -399,18 +399,17 @@ def test_samples_are_a_control_period_apart_from_zero() -> None:
     np.testing.assert_allclose(trace.p_WE, [arm.tip_position(q) for q in trace.q])
 
 
-def test_a_continuous_plant_gives_nearly_the_same_reach() -> None:
-    # The CENIC integrator controls its own error; free space needs no contact at all.
-    continuous = load_scenario(
-        "cylinder-clutter",
-        "{clutter: {num_movable: 0, num_fixed: 0}, scene: {time_step_s: 0}, stop: {timeout_s: 2}}",
-    )
-    discrete = free_space(2.0)
+def test_the_integrators_agree_in_free_space() -> None:
     tips = []
-    for scenario in (continuous, discrete):
+    for time_step_s in (0.0, 0.005, 0.0005):
+        scenario = load_scenario(
+            "cylinder-clutter",
+            f"{{scene: {{time_step_s: {time_step_s}}}, stop: {{timeout_s: 2}}}}",
+        )
         diagram = make_reach_diagram(scenario, make_clutter())
         q0 = start_angles(scenario)
         _, trace, _ = simulate(diagram, scenario, q0, np.array([0.7, 0.1, 0.0]))
         tips.append(np.array(trace.p_WE))
     assert np.linalg.norm(np.ptp(tips[0], axis=0)) > 0.05
-    np.testing.assert_allclose(tips[0], tips[1], atol=3e-3)
+    np.testing.assert_allclose(tips[0], tips[2], atol=5e-4)
+    np.testing.assert_allclose(tips[1], tips[2], atol=2e-3)

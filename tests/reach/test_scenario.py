@@ -102,6 +102,7 @@ def test_an_mpc_preset_fills_what_the_file_leaves_open() -> None:
         ("{scene: {time_step_s: -0.005}}", "scene: time_step_s must be from 1e-05 to 0.1, or 0"),
         ("{scene: {time_step_s: .nan}}", "scene: time_step_s must be from 1e-05 to 0.1, or 0"),
         ("{scene: {contact_approximation: tamsi}}", "must be one of sap, similar, lagged, got"),
+        ("{scene: {cenic_max_step_s: .nan}}", "cenic_max_step_s must be a positive number"),
         ("{scene: {ground_friction_N: 0}}", "ground_friction_N must be a positive number"),
         ("{scene: {contact: {skin_modulus_Pa: 0}}}", "contact skin_modulus_Pa must be positive"),
         ("{scene: {contact: {skin_mesh_m: 1.0e-9}}}", "contact skin_mesh_m must be at least"),

@@ -57,8 +57,8 @@ def test_an_object_in_motion_comes_to_rest_within_the_distance_of_dry_friction()
 
 
 @pytest.mark.parametrize("angle_deg", [0.0, 15.0, 30.0, 45.0, 70.0])
-def test_resistance_to_steady_motion_is_near_2_newtons_in_every_direction(angle_deg: float) -> None:
-    # A strong damper, in effect: the object is dragged at 5 cm/s against its friction.
+def test_resistance_to_motion_is_near_2_newtons_in_every_direction(angle_deg: float) -> None:
+    # Coasting at 5 cm/s for one or two steps: energy lost over distance gone.
     direction = np.array([np.cos(np.deg2rad(angle_deg)), np.sin(np.deg2rad(angle_deg))])
     world = make_world(
         PARKED, make_clutter(cylinder(0.6, 0.0, movable=True)), SceneConfig(time_step_s=0.0025)
@@ -66,8 +66,7 @@ def test_resistance_to_steady_motion_is_near_2_newtons_in_every_direction(angle_
     plant = world.scene.plant
     plant.SetVelocities(world.plant_context, world.scene.clutter, 0.05 * direction)
     before = plant.CalcKineticEnergy(world.plant_context)
-    step = 0.005
-    world.advance(step)
+    world.advance(0.005)
     loss = before - plant.CalcKineticEnergy(world.plant_context)
     resistance = loss / np.linalg.norm(world.objects[0] - [0.6, 0.0])
     expected = AXIS_LIMIT * np.abs(direction).sum()

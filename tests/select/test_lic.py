@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from select_surfaces import Bumps, random_bumps
 
 from lic_drake.errors import RequestError
 from lic_drake.estimate.features import PLANAR_LIC1
@@ -7,7 +8,6 @@ from lic_drake.reach.task import StartLine
 from lic_drake.robots.planar import planar_arm
 from lic_drake.select.lic import LbfgsbSelector, LicSelector
 from lic_drake.select.situation import Situation, StartSet
-from select_surfaces import Bumps, random_bumps
 
 ARM = planar_arm()
 STARTS = StartSet(arm=ARM, line=StartLine())

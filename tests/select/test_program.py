@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 from pydrake.autodiffutils import AutoDiffXd, InitializeAutoDiff
+from select_surfaces import Bumps, random_bumps
 
 from lic_drake.estimate.features import PLANAR_LIC1
 from lic_drake.reach.task import StartLine
 from lic_drake.robots.planar import planar_arm
 from lic_drake.select.program import StartProgram
-from select_surfaces import Bumps, random_bumps
 
 ARM = planar_arm()
 LINE = StartLine()

@@ -1,0 +1,132 @@
+"""Diagrams with Python systems die, and a process that simulates many reaches does not grow.
+
+What keeps a diagram alive for ever in Drake 1.58: a Python system that holds a frame, body, joint,
+another system's port, or an id object that a plant has returned.
+"""
+
+import gc
+import os
+import sys
+import weakref
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from reaches import free_space, reach_request, small_clutter, start_angles
+from worlds import box, cylinder, make_clutter
+
+from lic_drake.reach import recording, rollout
+from lic_drake.reach.diagram import ReachDiagram, make_reach_diagram
+from lic_drake.reach.recording import ReachRecording
+from lic_drake.reach.rollout import Environment, run_reach
+from lic_drake.reach.scenario import load_scenario
+
+pytestmark = pytest.mark.skipif(
+    not Path("/proc/self/statm").exists(), reason="the memory is read from Linux's /proc"
+)
+
+
+@pytest.fixture
+def built(monkeypatch: pytest.MonkeyPatch) -> Iterator[list["weakref.ref[Any]"]]:
+    """Weak references to all diagrams, and their systems, that are built during a test."""
+    references: list[weakref.ref[Any]] = []
+
+    def make(*args: Any) -> ReachDiagram:
+        reach_diagram = make_reach_diagram(*args)
+        systems = reach_diagram.diagram.GetSystems()
+        references.extend(weakref.ref(item) for item in (reach_diagram.diagram, *systems))
+        return reach_diagram
+
+    rollout._recent.clear()
+    for module in (rollout, recording):
+        monkeypatch.setattr(module, "make_reach_diagram", make)
+    yield references
+    rollout._recent.clear()
+
+
+def alive(references: list["weakref.ref[Any]"]) -> list[str]:
+    gc.collect()
+    return sorted(item.get_name() for reference in references if (item := reference()) is not None)
+
+
+ONE_DIAGRAM = ["controller", "plant", "reach", "scene_graph", "sensor", "standstill"]
+
+
+def test_only_the_diagram_of_the_last_environment_stays(built: list["weakref.ref[Any]"]) -> None:
+    for environment in range(5):
+        run_reach(reach_request(small_clutter(0.2), environment=environment))
+    assert len(built) == 5 * len(ONE_DIAGRAM)
+    assert alive(built) == ONE_DIAGRAM
+    rollout._recent.clear()
+    assert alive(built) == []
+
+
+def test_a_reach_in_contact_leaves_nothing(built: list["weakref.ref[Any]"]) -> None:
+    scenario = free_space(1.0)
+    wall = make_clutter(box(0.4, 0.0, (0.04, 0.8, 0.2)))
+    environment = Environment(scenario, wall)
+    x0 = np.array(reach_request(scenario).start)
+    _, trace, _ = environment.reach(np.array([0.7, 0.0, 0.0]), x0)
+    assert max(trace.contacts) > 0
+    del environment
+    assert alive(built) == []
+    assert len(built) == len(ONE_DIAGRAM)
+
+
+def test_failures_and_invalid_starts_leave_nothing(built: list["weakref.ref[Any]"]) -> None:
+    for environment, (goal, phi) in enumerate([(np.nan, 60.0), (0.6, -90.0), (0.6, 60.0)]):
+        run_reach(reach_request(free_space(0.1), (goal, 0.0), phi_deg=phi, environment=environment))
+    rollout._recent.clear()
+    assert alive(built) == []
+
+
+def test_a_recording_dies(built: list["weakref.ref[Any]"], tmp_path: Path) -> None:
+    scenario = free_space(0.2)
+    recorded = ReachRecording(scenario, make_clutter(cylinder(0.5, 0.3, movable=True)))
+    recorded.add_reach(start_angles(scenario), np.array([0.6, 0.1, 0.0]))
+    recorded.save(tmp_path / "reach.html")
+    assert alive(built)
+    del recorded
+    assert alive(built) == []
+
+
+def test_the_collector_is_not_left_to_chance(built: list["weakref.ref[Any]"]) -> None:
+    gc.disable()
+    try:
+        for environment in range(3):
+            run_reach(reach_request(small_clutter(0.04), environment=environment))
+        left = [item for reference in built if (item := reference()) is not None]
+        assert len(left) == len(ONE_DIAGRAM)
+    finally:
+        gc.enable()
+
+
+def resident_mb() -> float:
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def growth_mb(reach: Callable[[int], Any], first: int, count: int) -> float:
+    """Growth of the process from reach number `first` on, after the collector has run."""
+    for i in range(count):
+        if i == first:
+            gc.collect()
+            before = resident_mb()
+        reach(i)
+    gc.collect()
+    return resident_mb() - before
+
+
+@pytest.mark.slow
+def test_a_thousand_reaches_need_no_more_memory_than_a_hundred() -> None:
+    scenario = load_scenario("cylinder-clutter", "{stop: {timeout_s: 0.04}}")
+
+    def reach(i: int) -> None:
+        run_reach(reach_request(scenario, environment=i // 4))
+
+    assert growth_mb(reach, 100, 1000) < 30.0
