@@ -20,6 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 from reaches import free_space, reach_request, small_clutter, start_angles
 from worlds import box, cylinder, make_clutter
 
+from lic_drake.control.mpc import HapticMpc
 from lic_drake.reach import recording, rollout
 from lic_drake.reach.diagram import ReachDiagram, make_reach_diagram
 from lic_drake.reach.recording import ReachRecording
@@ -78,9 +79,20 @@ def test_a_reach_in_contact_leaves_nothing(built: list["weakref.ref[Any]"]) -> N
     assert len(built) == len(ONE_DIAGRAM)
 
 
-def test_failures_and_invalid_starts_leave_nothing(built: list["weakref.ref[Any]"]) -> None:
-    for environment, (goal, phi) in enumerate([(np.nan, 60.0), (0.6, -90.0), (0.6, 60.0)]):
-        run_reach(reach_request(free_space(0.1), (goal, 0.0), phi_deg=phi, environment=environment))
+def test_failures_and_invalid_starts_leave_nothing(
+    built: list["weakref.ref[Any]"], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise np.linalg.LinAlgError("no solution")
+
+    monkeypatch.setattr(HapticMpc, "step", fail)
+    requests = [
+        reach_request(small_clutter(0.1), environment=0),
+        reach_request(small_clutter(0.1), phi_deg=-90.0, environment=1),
+        reach_request(small_clutter(0.1), (5.0, 0.0), environment=2),
+    ]
+    outcomes = [run_reach(request).outcome for request in requests]
+    assert outcomes == ["diverged", "invalid_start", "unreachable"]
     rollout._recent.clear()
     assert alive(built) == []
 

@@ -1,5 +1,6 @@
 """The demonstration: select, reach, record, and show what was estimated."""
 
+import itertools
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -17,7 +18,7 @@ from lic_drake.evaluate.plots import draw_density, draw_top_view, save_figure
 from lic_drake.evaluate.trial import Attempt, planar_arm_of
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.recording import ReachRecording
-from lic_drake.reach.request import make_request
+from lic_drake.reach.request import is_within_reach, make_request
 from lic_drake.reach.rollout import make_record
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.trace import ReachTrace
@@ -73,7 +74,8 @@ def demonstrate(
     arm = planar_arm_of(scenario)
     starts = StartSet(arm=arm, line=scenario.task.start_line)
     instance = scenario.sample_instance("evaluation", seed)
-    p_WG = scenario.sample_goal("evaluation", seed)
+    draws = (scenario.sample_goal("evaluation", seed, index) for index in itertools.count())
+    p_WG = next(goal for goal in draws if is_within_reach(scenario, goal))
     columns = library.columns()
     say(
         f"{scenario.category}, evaluation environment {seed}: goal at"

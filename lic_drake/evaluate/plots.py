@@ -110,7 +110,8 @@ def draw_top_view(
         Circle((p_WG[0], p_WG[1]), scenario.stop.success_distance_m, color="tab:cyan", zorder=5)
     )
     ax.set(xlabel="x [m]", ylabel="y [m]", aspect="equal", xlim=(-0.3, 1.05), ylim=(-0.75, 0.75))
-    ax.legend(loc="upper left", fontsize=8)
+    if ax.get_legend_handles_labels()[0]:  # No attempt of which there is a path, no legend.
+        ax.legend(loc="upper left", fontsize=8)
     return ax
 
 

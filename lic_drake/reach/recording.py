@@ -1,5 +1,6 @@
 """Records reaches as one HTML file that plays offline, contact forces included."""
 
+import logging
 import math
 import time
 from pathlib import Path
@@ -22,7 +23,6 @@ Vector = NDArray[np.float64]
 
 PAUSE_S = 1.0
 """Time between two reaches of a recording, at least."""
-
 
 TICKS_PER_FRAME = 10
 """Meshcat rounds a frame's time down to ticks; with one a frame, some fell on the one before."""
@@ -52,7 +52,7 @@ class ReachRecording:
 
     def __init__(self, scenario: Scenario, instance: ClutterInstance) -> None:
         self._scenario = scenario
-        self._meshcat = Meshcat(MeshcatParams(show_stats_plot=False))
+        self._meshcat = _make_meshcat()
         frames_per_second = frame_rate(scenario.mpc.rate_hz)
         keep = select_near(instance, scenario.arm().reach_m)
         self._diagram = make_reach_diagram(
@@ -122,3 +122,14 @@ class ReachRecording:
         self._meshcat.SetTransform("/task/goal", RigidTransform(p_WG))
         self._meshcat.SetObject("/task/pole", Cylinder(0.002, 0.3), Rgba(0.0, 0.7, 0.8, 0.9))
         self._meshcat.SetTransform("/task/pole", RigidTransform(p_WG))
+
+
+def _make_meshcat() -> Meshcat:
+    """Returns a Meshcat without the message that tells where to look at it live."""
+    logger = logging.getLogger("drake")
+    level = logger.level
+    logger.setLevel(logging.WARNING)
+    try:
+        return Meshcat(MeshcatParams(show_stats_plot=False))
+    finally:
+        logger.setLevel(level)

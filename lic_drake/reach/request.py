@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from lic_drake.errors import RequestError
 from lic_drake.reach.scenario import Scenario
 
-OUTCOMES = ("reached", "stuck", "force", "timeout", "diverged", "invalid_start")
+OUTCOMES = ("reached", "stuck", "force", "timeout", "diverged", "invalid_start", "unreachable")
 """How a reach can end: at the goal; without progress; by the force stop; out of time; by a
-failure of the simulator; before it began, because the arm cannot stand at the start."""
+failure of the simulator; before it began, because the arm cannot stand at the start or because
+the goal is further away than the arm is long."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +63,8 @@ class ReachRecord:
     """One row of an experience library. SI units, radians, world frame W.
 
     Every field but `wall_time_s` is a function of the request; that one is left out when
-    records are compared. Where a reach never began (`invalid_start`), measured fields are NaN.
+    records are compared. Where a reach never began (`invalid_start`,
+    `unreachable`), measured fields are NaN.
     """
 
     key: str = field(metadata={"unit": "", "doc": "key of the request"})
@@ -122,10 +124,17 @@ def check_goal(scenario: Scenario, p_WG: NDArray[np.float64]) -> None:
     """
     if p_WG.shape != (3,) or not np.all(np.isfinite(p_WG)):
         raise RequestError(f"a goal is two finite numbers in metres, got {p_WG.tolist()}")
-    reach = scenario.arm().reach_m + scenario.stop.success_distance_m
-    distance = float(np.linalg.norm(p_WG))
-    if distance > reach:
+    if not is_within_reach(scenario, p_WG):
         raise RequestError(
-            f"the goal ({p_WG[0]:g}, {p_WG[1]:g}) m is {distance:.3f} m from the base and the arm"
-            f" reaches {reach:.3f} m; choose a nearer goal"
+            f"the goal ({p_WG[0]:g}, {p_WG[1]:g}) m is {np.linalg.norm(p_WG):.3f} m from the base"
+            f" and the arm reaches {_farthest_goal_m(scenario):.3f} m; choose a nearer goal"
         )
+
+
+def is_within_reach(scenario: Scenario, p_WG: NDArray[np.float64]) -> bool:
+    """Tells whether the straight arm could come near enough to a goal, shape (3,), to succeed."""
+    return float(np.linalg.norm(p_WG)) < _farthest_goal_m(scenario)
+
+
+def _farthest_goal_m(scenario: Scenario) -> float:
+    return scenario.arm().reach_m + scenario.stop.success_distance_m

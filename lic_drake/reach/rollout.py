@@ -16,7 +16,7 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 import lic_drake
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.reach.diagram import ReachDiagram, make_reach_diagram
-from lic_drake.reach.request import ReachRecord, ReachRequest
+from lic_drake.reach.request import ReachRecord, ReachRequest, is_within_reach
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.stop_rules import StopMonitor
 from lic_drake.reach.trace import ReachTrace
@@ -45,8 +45,11 @@ class Environment:
 
         Returns:
             The outcome, the trace, and a remark for outcomes that need one. The trace is empty
-            when the arm cannot stand at the start.
+            when the arm cannot stand at the start, and when the goal is out of its reach: that
+            reach is known to fail without simulating it.
         """
+        if not is_within_reach(self.scenario, p_WG):
+            return "unreachable", ReachTrace(), "the goal is beyond the arm's reach"
         outcome, trace, detail = self._run(self._near, p_WG, x0)
         if trace.q and reaches_left_out(self.instance, self.keep, trace.outermost_m):
             if self._whole is None:

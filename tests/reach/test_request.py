@@ -11,7 +11,7 @@ from fake_reach import make_record
 from reaches import reach_request
 
 from lic_drake.errors import RequestError
-from lic_drake.reach.request import ReachRecord, ReachRequest, check_goal
+from lic_drake.reach.request import ReachRecord, ReachRequest, check_goal, make_request
 from lic_drake.reach.scenario import load_scenario
 
 SCENARIO = load_scenario("cylinder-clutter")
@@ -74,6 +74,15 @@ def test_keys_are_the_same_in_another_process() -> None:
 def test_numpy_numbers_give_the_key_of_plain_ones() -> None:
     request = reach_request(SCENARIO)
     assert replace(request, goal=tuple(np.array(request.goal))).key == request.key
+
+
+def test_a_request_from_arrays_holds_plain_numbers() -> None:
+    expected = reach_request(SCENARIO, environment=3)
+    request = make_request(
+        SCENARIO, "training", 3, np.array(expected.goal), np.array(expected.start)
+    )
+    assert request == expected
+    assert all(type(value) is float for value in (*request.goal, *request.start))
 
 
 def test_records_are_compared_without_their_wall_time() -> None:

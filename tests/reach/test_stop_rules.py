@@ -1,6 +1,7 @@
 """Motions in closed form, and the sample at which each rule must end them."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -79,10 +80,10 @@ def test_a_motion_that_ends_is_stuck_four_seconds_later() -> None:
 
 
 def test_a_slow_reach_is_out_of_time_at_the_sample_of_the_timeout() -> None:
-    short = StopConfig(timeout_s=1.2)
+    short = replace(RULES, timeout_s=1.2)
     assert ending(lambda t: 0.01 * t, config=short) == ("timeout", 30)
     # 0.1 s is no multiple of 0.04 s: the first sample after it ends the reach.
-    assert ending(still, config=StopConfig(timeout_s=0.1)) == ("timeout", 3)
+    assert ending(still, config=replace(RULES, timeout_s=0.1)) == ("timeout", 3)
 
 
 def test_force_ends_a_reach_when_it_is_over_the_limit_for_long_enough() -> None:
@@ -112,14 +113,14 @@ def test_a_goal_that_is_reached_with_a_knock_is_reached() -> None:
 
 
 def test_a_stuck_window_shorter_than_a_step_still_spans_one() -> None:
-    short = StopConfig(stuck_time_s=0.001)
+    short = replace(RULES, stuck_time_s=0.001)
     assert ending(still, config=short) == ("stuck", 1)
     assert ending(lambda t: 0.06 * t, config=short)[0] == "timeout"
 
 
 @pytest.mark.parametrize("stuck_time_s", [30.04, 1e6, 1e300, np.inf])
 def test_a_stuck_time_over_the_timeout_switches_the_rule_off(stuck_time_s: float) -> None:
-    assert ending(still, config=StopConfig(stuck_time_s=stuck_time_s)) == ("timeout", 750)
+    assert ending(still, config=replace(RULES, stuck_time_s=stuck_time_s)) == ("timeout", 750)
 
 
 def test_the_smallest_distance_is_kept() -> None:

@@ -1,0 +1,162 @@
+import dataclasses
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+from lic_drake.cli.main import main
+from lic_drake.reach.request import OUTCOMES, ReachRecord
+from lic_drake.reach.rollout import run_reach
+from lic_drake.reach.scenario import load_scenario
+
+SMALL = "{clutter: {num_movable: 2, num_fixed: 2}, stop: {timeout_s: 0.4}}"
+LIC_REACH = ["reach", "--set", SMALL]
+
+
+def refuse_constants(name: str) -> Any:
+    raise AssertionError(f"{name} is not JSON")
+
+
+def run_json(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]:
+    assert main([*LIC_REACH, "--json", *arguments]) == 0
+    output = capsys.readouterr()
+    assert output.err == ""
+    record: dict[str, Any] = json.loads(output.out, parse_constant=refuse_constants)
+    return record
+
+
+def test_json_output_is_the_record(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["--goal", "0.5", "-0.1", "--start-y", "-0.1", "--start-phi", "30"]
+    values = run_json(capsys, *arguments, "--environment", "3", "--stream", "training")
+    assert list(values) == [item.name for item in dataclasses.fields(ReachRecord)]
+    assert values["outcome"] in OUTCOMES
+    assert (values["stream"], values["environment"]) == ("training", 3)
+    assert (values["goal_x"], values["goal_y"], values["goal_z"]) == (0.5, -0.1, 0.0)
+    assert (values["start_x"], values["start_y"]) == (0.335, -0.1)
+    assert values["start_phi"] == pytest.approx(0.5235987755982988)
+    assert values["scenario"] == load_scenario("cylinder-clutter", SMALL).digest
+    values["q_start"], values["q_final"] = tuple(values["q_start"]), tuple(values["q_final"])
+    record = ReachRecord(**values)
+    assert record.duration_s == 0.4 and len(record.q_final) == 3
+
+
+def test_the_same_command_gives_the_same_record(capsys: pytest.CaptureFixture[str]) -> None:
+    first, second = run_json(capsys), run_json(capsys)
+    del first["wall_time_s"], second["wall_time_s"]
+    assert first == second
+    assert first["stream"] == "evaluation" and first["environment"] == 0
+
+
+def test_the_text_says_how_it_ended(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(LIC_REACH) == 0
+    output = capsys.readouterr().out
+    assert output.startswith("timeout after 0.40 s (")
+    assert output.count("\n") == 1
+    reached = "{clutter: {num_movable: 0, num_fixed: 0}}"
+    assert main(["reach", "--set", reached, "--goal", "0.4", "0.05"]) == 0
+    assert capsys.readouterr().out.startswith("reached after ")
+
+
+def test_a_scenario_can_be_a_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text(
+        "category: cylinder-clutter\nrobot: planar-arm\nclutter: {num_movable: 0, num_fixed: 1}\n"
+        "stop: {timeout_s: 0.2}\n"
+    )
+    assert main(["reach", "--scenario", str(path)]) == 0
+    assert capsys.readouterr().out.startswith("timeout after 0.20 s")
+
+
+def test_a_diagram_and_a_recording_are_written(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    svg, html = tmp_path / "reach.svg", tmp_path / "reach.html"
+    plain = run_json(capsys)
+    shown = run_json(capsys, "--diagram", str(svg), "--record", str(html))
+    del plain["wall_time_s"], shown["wall_time_s"]
+    assert shown == plain
+    assert ElementTree.parse(svg).getroot().tag.endswith("svg")
+    content = html.read_text(encoding="utf-8")
+    assert content.lstrip().lower().startswith("<!doctype html")
+    assert len(content) > 1_000_000
+
+
+def test_a_recording_leaves_the_output_to_the_command(tmp_path: Path) -> None:
+    # In a process of its own, where Drake's log goes to the terminal.
+    command = [sys.executable, "-m", "lic_drake", *LIC_REACH, "--json"]
+    result = subprocess.run(
+        [*command, "--record", str(tmp_path / "reach.html")], capture_output=True, text=True
+    )
+    assert (result.returncode, result.stderr) == (0, "")
+    assert json.loads(result.stdout)["outcome"] == "timeout"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--goal", "5", "0"], "the goal (5, 0) m is 5.000 m from the base and the arm reaches"),
+        (["--goal", "nan", "0"], "a goal is two finite numbers in metres, got [nan, 0.0, 0.0]"),
+        (["--goal", "0.6", "inf"], "a goal is two finite numbers in metres, got [0.6, inf, 0.0]"),
+        (["--start-y", "nan"], "a start is two finite numbers, got y nan m, phi 60.0 degrees"),
+        (["--start-phi", "inf"], "a start is two finite numbers, got y 0.0 m, phi inf degrees"),
+        (["--start-phi", "-90"], "cannot start at y 0 m, phi -90 degrees: no configuration within"),
+        (["--start-y", "9"], "cannot start at y 9 m, phi 60 degrees: no configuration within"),
+        (["--scenario", "jungle"], "no scenario 'jungle'; shipped scenarios: "),
+        (["--scenario", "none.yaml"], "no scenario 'none.yaml'; shipped scenarios: "),
+        (["--set", "{stop: {timeout_s: -1}}"], "cylinder-clutter: stop: stop rule timeout_s must"),
+        (["--set", "{"], "overrides: not YAML: "),
+        (["--set", "{mpc: {preset: best}}"], "unknown mpc preset 'best'"),
+        (["--stream", "test"], "unknown seed stream 'test'; choose one of training, evaluation"),
+        (["--environment", "-1"], "seed indices must be from 0 to 2^32 - 1, got [-1]"),
+        (["--environment", "4294967296"], "seed indices must be from 0 to 2^32 - 1, got"),
+        (["--diagram", "{tmp}/none/a.svg"], "cannot write the drawing {tmp}/none/a.svg: "),
+        (["--diagram", "{tmp}/a.docx"], "cannot write the drawing {tmp}/a.docx: "),
+        (["--record", "{tmp}/none/a.html"], "cannot write {tmp}/none/a.html: No such file"),
+        (["--record", "{tmp}"], "cannot write {tmp}: Is a directory"),
+    ],
+)
+def test_a_mistake_is_one_line_and_exit_code_2(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, arguments: list[str], message: str
+) -> None:
+    arguments = [argument.replace("{tmp}", str(tmp_path)) for argument in arguments]
+    assert main([*LIC_REACH, *arguments]) == 2
+    output = capsys.readouterr()
+    assert output.out == ""
+    assert output.err.startswith("lic: error: ")
+    assert output.err.count("\n") == 1
+    assert message.replace("{tmp}", str(tmp_path)) in output.err
+
+
+def test_a_start_in_the_clutter_is_a_mistake(capsys: pytest.CaptureFixture[str]) -> None:
+    crowded = (
+        "{clutter: {num_movable: 0, num_fixed: 1, lower: [0.33, -0.005], upper: [0.34, 0.005]}}"
+    )
+    assert main(["reach", "--set", crowded]) == 2
+    assert "the arm touches the clutter at its start" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "arguments", [["--goal", "0.6"], ["--goal", "a", "b"], ["--environment", "1.5"], ["--set"]]
+)
+def test_what_argparse_refuses_has_exit_code_2(
+    capsys: pytest.CaptureFixture[str], arguments: list[str]
+) -> None:
+    with pytest.raises(SystemExit) as end:
+        main([*LIC_REACH, *arguments])
+    assert end.value.code == 2
+    assert "lic reach: error: " in capsys.readouterr().err
+
+
+def test_a_reach_that_fails_in_the_simulator_is_reported_not_raised(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def diverge(request: Any) -> ReachRecord:
+        return dataclasses.replace(run_reach(request), outcome="diverged", detail="solver failed")
+
+    monkeypatch.setattr("lic_drake.reach.rollout.run_reach", diverge)
+    assert main(LIC_REACH) == 0
+    assert capsys.readouterr().out.startswith("diverged after 0.40 s")
