@@ -15,8 +15,9 @@ from lic_drake.control.mpc import HapticMpc
 from lic_drake.reach import rollout as dut
 from lic_drake.reach.diagram import make_reach_diagram
 from lic_drake.reach.request import ReachRecord, ReachRequest
-from lic_drake.reach.rollout import Environment, run_reach, simulate, with_start
+from lic_drake.reach.rollout import Environment, make_record, run_reach, simulate, with_start
 from lic_drake.reach.scenario import load_scenario
+from lic_drake.reach.trace import ReachTrace
 
 FREE = free_space()
 X0 = np.array(reach_request(FREE).start)
@@ -150,6 +151,29 @@ def test_touching_begins_where_the_surfaces_meet(movable: bool) -> None:
         outcome, trace, _ = in_clutter(make_clutter(cylinder(x, y, movable=movable)), timeout_s=0.1)
         assert (outcome == "invalid_start") == expected
         assert (trace.q == []) == expected
+
+
+@pytest.mark.parametrize(("outcome", "vx"), [("stuck", 0.1), ("timeout", 0.0)])
+def test_the_figures_of_a_record_come_from_the_trace(outcome: str, vx: float) -> None:
+    # 2 s at 0.1 m/s along x, then at rest for as long as the stuck rule asks.
+    trace, still_s = ReachTrace(), FREE.stop.stuck_time_s
+    q = np.array([0.1, 0.2, 0.3])
+    for k in range(round((2.0 + still_s) / 0.04) + 1):
+        p_WE = np.array([0.1 * min(0.04 * k, 2.0), 0.0, 0.0])
+        trace.append(0.04 * k, q, p_WE, np.array([4.0, 0.0, 2.0]) * (k % 2))
+    request = reach_request(FREE, (0.3, 0.0))
+    record = make_record(request, outcome, trace, "why", 1.5)
+    assert (record.final_vx, record.final_vy) == (pytest.approx(vx), 0.0)
+    # The smallest distance is that of the trace's tips, the final pose that of q.
+    assert record.min_distance == pytest.approx(0.1)
+    np.testing.assert_allclose(
+        [record.final_x, record.final_y, record.final_phi], FREE.arm().tip_pose(q)
+    )
+    assert (record.q_start, record.q_final) == ((0.1, 0.2, 0.3),) * 2
+    assert (record.peak_force, record.mean_force, record.peak_contacts) == (4.0, 3.0, 2)
+    assert record.mean_contacts == pytest.approx(1.0, abs=0.01)
+    assert record.duration_s == pytest.approx(2.0 + still_s)
+    assert (record.wall_time_s, record.detail) == (1.5, "why")
 
 
 # Failures of the simulation
