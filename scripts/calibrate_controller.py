@@ -5,29 +5,28 @@ fixed cylinders in x 0.2..0.8, y -0.6..0.6 m, the 100 Hz controller with 5 N, ei
 at 0.5, 0.6 and 0.7 m from the base within 30 degrees of straight ahead, one start posture. Their
 result files say 77.3 % for 20 cylinders and 28.3 % for 80.
 
-    python scripts/calibrate_controller.py --fields 25 --out notebooks/results/calibration
+    python scripts/calibrate_controller.py --out notebooks/results/calibration
 """
 
 import argparse
+import os
 import sys
 from collections import Counter
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
 
-from lic_drake.experience.workers import prepare_worker
+from lic_drake.evaluate.batch import simulate_requests
+from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.intervals import wilson_interval
-from lic_drake.reach.request import ReachRecord, ReachRequest
-from lic_drake.reach.rollout import run_reach
+from lic_drake.reach.request import ReachRequest, make_request
 from lic_drake.reach.scenario import Scenario, load_scenario
 
 PUBLISHED = {20: 77.3, 80: 28.3}
 START_Q_DEG = (-50.0, 70.0, 145.0)
 
 
-def goals() -> list[tuple[float, float, float]]:
+def goals() -> list[np.ndarray]:
     """Returns the eight goals p_WG: 3, 2 and 3 at growing distance, staggered."""
     polar = [(0.5, a) for a in (-30, 0, 30)] + [(0.6, a) for a in (-15, 15)]
     polar += [(0.7, a) for a in (-30, 0, 30)]
@@ -36,59 +35,44 @@ def goals() -> list[tuple[float, float, float]]:
     ]
 
 
-def field_requests(scenario: Scenario, field: int) -> list[ReachRequest]:
-    """Returns the reaches of one field."""
+def field_requests(scenario: Scenario, fields: int) -> list[ReachRequest]:
+    """Returns the reaches of all fields."""
     x0 = scenario.arm().tip_pose(np.deg2rad(START_Q_DEG))
-    start = (float(x0[0]), float(x0[1]), float(x0[2]))
     return [
-        ReachRequest(
-            scenario=scenario, stream="calibration", environment=field, goal=goal, start=start
-        )
-        for goal in goals()
+        make_request(scenario, "calibration", field, p_WG, x0)
+        for field in range(fields)
+        for p_WG in goals()
     ]
-
-
-def run_field(requests: list[ReachRequest]) -> list[ReachRecord]:
-    return [run_reach(request) for request in requests]
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--fields", type=int, default=25, help="fields of each density")
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--set", default="", help="YAML values over the calibration scenario")
-    parser.add_argument("--out", type=Path, help="folder for calibration.md")
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--out", type=Path, required=True, help="folder for reaches and the table")
     args = parser.parse_args()
     lines = [
         "| fixed cylinders | published, % | ours, % | 90 % interval | n | outcomes |",
         "|---|---|---|---|---|---|",
     ]
-    with ProcessPoolExecutor(
-        args.workers, mp_context=get_context("forkserver"), initializer=prepare_worker
-    ) as executor:
-        for count, published in PUBLISHED.items():
-            scenario = load_scenario("calibration-field", f"{{clutter: {{num_fixed: {count}}}}}")
-            if args.set:
-                scenario = load_scenario(
-                    "calibration-field",
-                    f"{{clutter: {{num_fixed: {count}}}, {args.set.strip().strip('{}')}}}",
-                )
-            tasks = [field_requests(scenario, field) for field in range(args.fields)]
-            records = [record for rows in executor.map(run_field, tasks) for record in rows]
-            won = sum(record.success for record in records)
-            low, high = wilson_interval(won, len(records))
-            outcomes = ", ".join(
-                f"{name} {n}" for name, n in Counter(r.outcome for r in records).most_common()
-            )
-            lines.append(
-                f"| {count} | {published:.1f} | {100 * won / len(records):.1f} |"
-                f" {100 * low:.1f}..{100 * high:.1f} | {len(records)} | {outcomes} |"
-            )
-            print(lines[-1], flush=True)
+    for count, published in PUBLISHED.items():
+        scenario = load_scenario("calibration-field", f"{{clutter: {{num_fixed: {count}}}}}")
+        library = ExperienceLibrary(args.out / f"fixed-{count}")
+        library.create()
+        requests = field_requests(scenario, args.fields)
+        found = simulate_requests(requests, library, scenario, args.workers, print)
+        records = [found[request.key] for request in requests]
+        won = sum(record.success for record in records)
+        low, high = wilson_interval(won, len(records))
+        outcomes = Counter(record.outcome for record in records).most_common()
+        lines.append(
+            f"| {count} | {published:.1f} | {100 * won / len(records):.1f} |"
+            f" {100 * low:.1f}..{100 * high:.1f} | {len(records)} |"
+            f" {', '.join(f'{name} {n}' for name, n in outcomes)} |"
+        )
     text = "\n".join(lines) + "\n"
-    if args.out:
-        args.out.mkdir(parents=True, exist_ok=True)
-        (args.out / "calibration.md").write_text(text, encoding="utf-8")
+    (args.out / "calibration.md").write_text(text, encoding="utf-8")
+    print(text, end="")
     return 0
 
 

@@ -362,6 +362,13 @@ def test_what_is_left_out_makes_no_difference(
         assert getattr(culled, name) == pytest.approx(getattr(whole, name), abs=1e-6), name
 
 
+def test_what_only_the_outstretched_arm_touches_is_not_left_out() -> None:
+    environment = Environment(free_space(), make_clutter(cylinder(0.8, 0.0), cylinder(1.0, 0.0)))
+    assert environment.keep.tolist() == [True, False]
+    _, trace, _ = environment.reach(np.array([0.82, 0.0, 0.0]), X0)
+    assert max(trace.contacts) > 0
+
+
 def test_pushing_an_object_outwards_repeats_the_reach_in_the_whole_environment(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
