@@ -30,9 +30,7 @@ def goals() -> list[np.ndarray]:
     """Returns the eight goals p_WG: 3, 2 and 3 at growing distance, staggered."""
     polar = [(0.5, a) for a in (-30, 0, 30)] + [(0.6, a) for a in (-15, 15)]
     polar += [(0.7, a) for a in (-30, 0, 30)]
-    return [
-        (float(r * np.cos(np.deg2rad(a))), float(r * np.sin(np.deg2rad(a))), 0.0) for r, a in polar
-    ]
+    return [np.array([r * np.cos(np.deg2rad(a)), r * np.sin(np.deg2rad(a)), 0.0]) for r, a in polar]
 
 
 def field_requests(scenario: Scenario, fields: int) -> list[ReachRequest]:
