@@ -3,6 +3,7 @@
 import argparse
 import dataclasses
 import json
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -90,6 +91,9 @@ def run(args: argparse.Namespace) -> int:
             f"a start is two finite numbers, got y {args.start_y} m, phi {args.start_phi} degrees"
         )
     request = make_request(scenario, args.stream, args.environment, p_WG, x0)
+    for path in (args.diagram, args.record):
+        if path is not None:
+            _check_writable(path)
     if args.diagram is not None:
         _draw(request, args.diagram)
     record = run_reach(request)
@@ -100,8 +104,26 @@ def run(args: argparse.Namespace) -> int:
         )
     if args.record is not None:
         _record(request, args.record)
-    print(json.dumps(dataclasses.asdict(record)) if args.json else _describe(record))
+    print(_to_json(record) if args.json else _describe(record))
     return 0
+
+
+def _check_writable(path: Path) -> None:
+    """Finds out before the simulation that a file cannot be written."""
+    from lic_drake.errors import LicError
+
+    try:
+        with path.open("ab"):
+            pass
+    except OSError as error:
+        raise LicError(f"cannot write {path}: {error.strerror}; choose another path") from None
+
+
+def _to_json(record: "ReachRecord") -> str:
+    """Returns the record as JSON, which has null for a figure that was never measured."""
+    values = dataclasses.asdict(record)
+    unmeasured = [k for k, v in values.items() if isinstance(v, float) and math.isnan(v)]
+    return json.dumps({**values, **dict.fromkeys(unmeasured)})
 
 
 def _draw(request: "ReachRequest", path: Path) -> None:

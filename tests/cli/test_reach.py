@@ -113,7 +113,7 @@ def test_a_recording_leaves_the_output_to_the_command(tmp_path: Path) -> None:
         (["--stream", "test"], "unknown seed stream 'test'; choose one of training, evaluation"),
         (["--environment", "-1"], "seed indices must be from 0 to 2^32 - 1, got [-1]"),
         (["--environment", "4294967296"], "seed indices must be from 0 to 2^32 - 1, got"),
-        (["--diagram", "{tmp}/none/a.svg"], "cannot write the drawing {tmp}/none/a.svg: "),
+        (["--diagram", "{tmp}/none/a.svg"], "cannot write {tmp}/none/a.svg: "),
         (["--diagram", "{tmp}/a.docx"], "cannot write the drawing {tmp}/a.docx: "),
         (["--record", "{tmp}/none/a.html"], "cannot write {tmp}/none/a.html: No such file"),
         (["--record", "{tmp}"], "cannot write {tmp}: Is a directory"),
