@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -99,14 +100,15 @@ def demonstrate(
             f" (chosen in {selection.seconds:.2f} s)"
         )
         request = make_request(scenario, "evaluation", seed, p_WG, selection.x0)
-        outcome, trace, detail, wall_time_s = recording.add_reach(selection.q, p_WG)
-        record = make_record(request, outcome, trace, detail, wall_time_s)
+        began = time.perf_counter()
+        result = recording.add_reach(selection.q, p_WG)
+        record = make_record(request, result, time.perf_counter() - began)
         say(
             f"attempt {number}: {record.outcome} after {record.duration_s:.1f} s, nearest to the"
             f" goal {1000 * record.min_distance:.0f} mm, peak force {record.peak_force:.1f} N,"
-            f" simulated in {wall_time_s:.1f} s"
+            f" simulated in {record.wall_time_s:.1f} s"
         )
-        done.append((Attempt(selection=selection, request=request, record=record), trace))
+        done.append((Attempt(selection=selection, request=request, record=record), result.trace))
         if record.success:
             break
 
@@ -136,9 +138,9 @@ def demonstrate(
         [(label, trace) for label, (_, trace) in zip(labels, done, strict=True)],
     )
     save_figure(figure, files["path"])
-    result = Demonstration(p_WG=p_WG, attempts=[attempt for attempt, _ in done], files=files)
-    _write_json(result, method, seed)
-    return result
+    demonstration = Demonstration(p_WG=p_WG, attempts=[attempt for attempt, _ in done], files=files)
+    _write_json(demonstration, method, seed)
+    return demonstration
 
 
 def _make_folder(out: Path) -> None:

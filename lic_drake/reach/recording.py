@@ -2,7 +2,6 @@
 
 import logging
 import math
-import time
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,7 @@ from lic_drake.errors import LicError
 from lic_drake.reach.diagram import make_reach_diagram
 from lic_drake.reach.rollout import simulate
 from lic_drake.reach.scenario import Scenario
-from lic_drake.reach.trace import ReachTrace
+from lic_drake.reach.trace import ReachResult
 from lic_drake.scene.culling import select_near, take
 from lic_drake.scene.scene import FIXED_COLOR, MOVABLE_COLOR, make_shape
 
@@ -70,24 +69,18 @@ class ReachRecording:
         )
         self._clock_s = 0.0
 
-    def add_reach(self, q0: Vector, p_WG: Vector) -> tuple[str, ReachTrace, str, float]:
+    def add_reach(self, q0: Vector, p_WG: Vector) -> ReachResult:
         """Simulates and records a reach in the environment as it was drawn.
 
         Args:
             q0: First joint angles, shape (m,), radians.
             p_WG: Goal, shape (3,), metres.
-
-        Returns:
-            Outcome, trace and remark as `lic_drake.reach.rollout.simulate`; wall time, seconds.
         """
-        began = time.perf_counter()
         self._draw_goal(p_WG)
-        outcome, trace, detail = simulate(
-            self._diagram, self._scenario, q0, p_WG, begin_s=self._clock_s
-        )
-        if trace.time_s:
-            self._clock_s += math.ceil(trace.time_s[-1] + PAUSE_S)
-        return outcome, trace, detail, time.perf_counter() - began
+        result = simulate(self._diagram, self._scenario, q0, p_WG, begin_s=self._clock_s)
+        if result.trace.time_s:
+            self._clock_s += math.ceil(result.trace.time_s[-1] + PAUSE_S)
+        return result
 
     def save(self, path: Path) -> None:
         """Writes the recording.

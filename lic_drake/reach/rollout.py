@@ -3,7 +3,6 @@
 import gc
 import math
 import time
-from dataclasses import replace
 from functools import cache
 from importlib.metadata import version
 from typing import cast
@@ -19,7 +18,7 @@ from lic_drake.reach.diagram import ReachDiagram, make_reach_diagram
 from lic_drake.reach.request import ReachRecord, ReachRequest, is_within_reach
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.stop_rules import StopMonitor
-from lic_drake.reach.trace import ReachTrace
+from lic_drake.reach.trace import ReachResult, ReachTrace
 from lic_drake.scene.culling import reaches_left_out, select_near, take
 
 Vector = NDArray[np.float64]
@@ -36,7 +35,7 @@ class Environment:
         self._near = make_reach_diagram(scenario, take(instance, self.keep))
         self._whole: ReachDiagram | None = None
 
-    def reach(self, p_WG: Vector, x0: Vector) -> tuple[str, ReachTrace, str]:
+    def reach(self, p_WG: Vector, x0: Vector) -> ReachResult:
         """Simulates a reach.
 
         Args:
@@ -44,25 +43,23 @@ class Environment:
             x0: Start pose of the hand.
 
         Returns:
-            The outcome, the trace, and a remark for outcomes that need one. The trace is empty
-            when the arm cannot stand at the start, and when the goal is out of its reach: that
-            reach is known to fail without simulating it.
+            How it ended. A goal out of the arm's reach is known to fail without simulating it.
         """
         if not is_within_reach(self.scenario, p_WG):
-            return "unreachable", ReachTrace(), "the goal is beyond the arm's reach"
-        outcome, trace, detail = self._run(self._near, p_WG, x0)
-        if trace.q and reaches_left_out(self.instance, self.keep, trace.outermost_m):
+            return ReachResult("unreachable", ReachTrace(), "the goal is beyond the arm's reach")
+        result = self._run(self._near, p_WG, x0)
+        if reaches_left_out(self.instance, self.keep, result.trace.outermost_m):
             if self._whole is None:
                 self._whole = make_reach_diagram(self.scenario, self.instance)
-            outcome, trace, detail = self._run(self._whole, p_WG, x0)
-        return outcome, trace, detail
+            result = self._run(self._whole, p_WG, x0)
+        return result
 
-    def _run(
-        self, reach_diagram: ReachDiagram, p_WG: Vector, x0: Vector
-    ) -> tuple[str, ReachTrace, str]:
+    def _run(self, reach_diagram: ReachDiagram, p_WG: Vector, x0: Vector) -> ReachResult:
         q0 = self.arm.solve_ik(x0)
         if q0 is None:
-            return "invalid_start", ReachTrace(), "no configuration within the joint limits"
+            return ReachResult(
+                "invalid_start", ReachTrace(), "no configuration within the joint limits"
+            )
         return simulate(reach_diagram, self.scenario, q0, p_WG)
 
 
@@ -72,7 +69,7 @@ def simulate(
     q0: Vector,
     p_WG: Vector,
     begin_s: float = 0.0,
-) -> tuple[str, ReachTrace, str]:
+) -> ReachResult:
     """Runs a diagram from rest at q0 until a stop rule ends the reach.
 
     Args:
@@ -82,9 +79,6 @@ def simulate(
         p_WG: Goal, shape (3,), metres.
         begin_s: Time on the diagram's clock at which the reach begins, a whole number of seconds;
             the trace's times count from there. Recordings put one reach after another with it.
-
-    Returns:
-        Outcome, trace and remark as `Environment.reach`.
     """
     diagram, scene = reach_diagram.diagram, reach_diagram.scene
     arm = scenario.arm()
@@ -101,7 +95,9 @@ def simulate(
         ),
     )
     if query.HasCollisions():
-        return "invalid_start", ReachTrace(), "the arm touches the clutter at its start"
+        return ReachResult(
+            "invalid_start", ReachTrace(), "the arm touches the clutter at its start"
+        )
 
     arm_state = diagram.GetOutputPort("arm_state")
     clutter_state = diagram.GetOutputPort("clutter_state")
@@ -128,9 +124,9 @@ def simulate(
             # Reading the taxels solves the contacts of this instant, which can fail, too.
             forces = np.asarray(taxel_force.Eval(context))
         except (ArithmeticError, RuntimeError, ValueError) as error:
-            return "diverged", trace, " ".join(str(error).split())[:200]
+            return ReachResult("diverged", trace, " ".join(str(error).split())[:200])
         if not np.all(np.isfinite(q)):
-            return "diverged", trace, "joint angles are not finite"
+            return ReachResult("diverged", trace, "joint angles are not finite")
         p_WE = arm.tip_position(q)
         time_s = step * period_s
         trace.append(time_s, q, p_WE, forces)
@@ -138,7 +134,7 @@ def simulate(
             trace.follow(np.asarray(clutter_state.Eval(context))[: 2 * num_movable])
         outcome = monitor.update(time_s, p_WE, trace.peak_force[-1])
         if outcome is not None:
-            return outcome, trace, ""
+            return ReachResult(outcome, trace)
         step += 1
 
 
@@ -165,14 +161,13 @@ def run_reach(request: ReachRequest) -> ReachRecord:
     """
     began = time.perf_counter()
     p_WG, x0 = np.array(request.goal), np.array(request.start)
-    outcome, trace, detail = environment_of(request).reach(p_WG, x0)
-    return make_record(request, outcome, trace, detail, time.perf_counter() - began)
+    result = environment_of(request).reach(p_WG, x0)
+    return make_record(request, result, time.perf_counter() - began)
 
 
-def make_record(
-    request: ReachRequest, outcome: str, trace: ReachTrace, detail: str, wall_time_s: float
-) -> ReachRecord:
+def make_record(request: ReachRequest, result: ReachResult, wall_time_s: float) -> ReachRecord:
     """Returns the library row of a finished reach."""
+    outcome, trace, detail = result
     scenario = request.scenario
     nothing = not trace.q
     final = np.full(3, np.nan) if nothing else scenario.arm().tip_pose(trace.q[-1])
@@ -217,8 +212,3 @@ def make_record(
 @cache
 def _drake_version() -> str:
     return version("drake")
-
-
-def with_start(request: ReachRequest, x0: Vector) -> ReachRequest:
-    """Returns the same request from another start pose."""
-    return replace(request, start=(float(x0[0]), float(x0[1]), float(x0[2])))

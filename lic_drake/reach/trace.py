@@ -1,6 +1,7 @@
 """What happened during a reach, sample by sample, and the figures that a record keeps of it."""
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,3 +80,17 @@ class ReachTrace:
             return np.zeros(3)
         velocity: Vector = (self.p_WE[last] - self.p_WE[first]) / span
         return velocity
+
+
+class ReachResult(NamedTuple):
+    """How a simulated reach ended.
+
+    Attributes:
+        outcome: One of `lic_drake.reach.request.OUTCOMES`.
+        trace: Its samples; empty when the reach never began.
+        detail: A remark on outcomes that need one, else empty.
+    """
+
+    outcome: str
+    trace: ReachTrace
+    detail: str = ""

@@ -1,5 +1,6 @@
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,9 @@ from lic_drake.control.mpc import HapticMpc
 from lic_drake.reach import rollout as dut
 from lic_drake.reach.diagram import make_reach_diagram
 from lic_drake.reach.request import ReachRecord, ReachRequest
-from lic_drake.reach.rollout import Environment, make_record, run_reach, simulate, with_start
+from lic_drake.reach.rollout import Environment, make_record, run_reach, simulate
 from lic_drake.reach.scenario import load_scenario
-from lic_drake.reach.trace import ReachTrace
+from lic_drake.reach.trace import ReachResult, ReachTrace
 
 FREE = free_space()
 X0 = np.array(reach_request(FREE).start)
@@ -128,7 +129,7 @@ def test_a_start_without_a_configuration_is_invalid() -> None:
 @pytest.mark.parametrize("start", [(math.nan, 0.0, 0.0), (0.335, math.inf, 0.0), (9.0, 9.0, 9.0)])
 @pytest.mark.filterwarnings("ignore:invalid value")
 def test_an_impossible_start_is_invalid_and_no_error(start: tuple[float, float, float]) -> None:
-    record = run_reach(with_start(reach_request(FREE), np.array(start)))
+    record = run_reach(replace(reach_request(FREE), start=start))
     assert_never_began(record, "invalid_start")
 
 
@@ -162,7 +163,7 @@ def test_the_figures_of_a_record_come_from_the_trace(outcome: str, vx: float) ->
         p_WE = np.array([0.1 * min(0.04 * k, 2.0), 0.0, 0.0])
         trace.append(0.04 * k, q, p_WE, np.array([4.0, 0.0, 2.0]) * (k % 2))
     request = reach_request(FREE, (0.3, 0.0))
-    record = make_record(request, outcome, trace, "why", 1.5)
+    record = make_record(request, ReachResult(outcome, trace, "why"), 1.5)
     assert (record.final_vx, record.final_vy) == (pytest.approx(vx), 0.0)
     # The smallest distance is that of the trace's tips, the final pose that of q.
     assert record.min_distance == pytest.approx(0.1)
@@ -325,13 +326,6 @@ def test_another_scenario_or_stream_is_another_environment() -> None:
     assert dut.environment_of(reach_request(free_space(0.08))) is not first
     other = dut.environment_of(reach_request(free_space(0.04), stream="evaluation"))
     assert dut.environment_of(request) is not other
-
-
-def test_with_start_changes_the_start_only() -> None:
-    request = reach_request(FREE)
-    moved = with_start(request, np.array([0.335, 0.1, 1.0]))
-    assert moved.start == (0.335, 0.1, 1.0)
-    assert with_start(moved, np.array(request.start)) == request
 
 
 # Left-out objects
