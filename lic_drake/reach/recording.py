@@ -63,7 +63,7 @@ class ReachRecording:
         self._meshcat.SetProperty("/Background", "bottom_color", [0.97, 0.97, 0.98])
         self._meshcat.SetProperty("/Grid", "visible", False)
         self._meshcat.SetProperty("/Axes", "visible", False)
-        self._meshcat.SetCameraPose(np.array([-0.55, -0.45, 1.35]), np.array([0.42, 0.05, 0.0]))
+        self._meshcat.SetCameraPose(np.array([-0.4, -0.3, 1.05]), np.array([0.45, 0.02, 0.0]))
         self._meshcat.StartRecording(
             TICKS_PER_FRAME * frames_per_second, set_visualizations_while_recording=False
         )
