@@ -8,6 +8,8 @@ import pytest
 from hypothesis import settings
 
 os.environ["MPLBACKEND"] = "Agg"
+# Several test processes share the cores; waiting BLAS threads would only slow each other down.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # A shell without job control ignores Ctrl-C in what it runs in the background, and child processes
 # inherit that; tests that interrupt a child would wait forever.

@@ -5,6 +5,7 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from threadpoolctl import threadpool_limits
 
 from lic_drake.estimate.averaging import AveragedRows, average_rows, reach_variance
 from lic_drake.estimate.checks import EstimateError, Vector, checked_queries, checked_rows
@@ -60,10 +61,13 @@ class GaussianProcess:
         """Learns from features Z, shape (n, d), and successes f, shape (n,); see `Predictor`."""
         Z, f = checked_rows(Z, f)
         hyperparameters = self._given
-        if hyperparameters is None:
-            fold = selection_folds(environment, len(f))
-            hyperparameters = self._choose_hyperparameters(Z, f, fold)
-        self._posterior = condition(self._rows(Z, f), hyperparameters)
+        # The matrices are small: OpenBLAS threads that wait for a busy core made a fit of two
+        # seconds take minutes.
+        with threadpool_limits(limits=1, user_api="blas"):
+            if hyperparameters is None:
+                fold = selection_folds(environment, len(f))
+                hyperparameters = self._choose_hyperparameters(Z, f, fold)
+            self._posterior = condition(self._rows(Z, f), hyperparameters)
         return self
 
     def conditioned_on(self, Z: ArrayLike, f: ArrayLike) -> "GaussianProcess":

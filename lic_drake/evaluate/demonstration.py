@@ -6,13 +6,13 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from lic_drake.errors import LicError
+from lic_drake.estimate.estimator import SuccessEstimator
 from lic_drake.estimate.features import PLANAR_LIC1
 from lic_drake.estimate.registry import make_estimator
 from lic_drake.evaluate.plots import draw_density, draw_top_view, save_figure
@@ -23,6 +23,7 @@ from lic_drake.reach.request import is_within_reach, make_request
 from lic_drake.reach.rollout import make_record
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.trace import ReachTrace
+from lic_drake.select.lic import LicSelector
 from lic_drake.select.registry import make_selector, needs_library
 from lic_drake.select.situation import Situation, StartSet
 
@@ -120,11 +121,16 @@ def demonstrate(
     }
     recording.save(files["recording"])
     labels = [f"{_ordinal(i)} start: {a.record.outcome}" for i, (a, _) in enumerate(done)]
-    density_method = method if needs_library(method) else "gp"
+    if isinstance(selector, LicSelector):
+        estimator, estimator_name = selector.estimator, method
+    else:
+        rows = PLANAR_LIC1.rows(columns)
+        estimator_name = "gp"
+        estimator = make_estimator(estimator_name).fit(rows.Z, rows.f, rows.environment)
     _save_density(
         files["density"],
-        columns,
-        density_method,
+        estimator,
+        estimator_name,
         starts,
         p_WG,
         [(label, a.selection.x0) for label, (a, _) in zip(labels, done, strict=True)],
@@ -158,14 +164,12 @@ def _make_folder(out: Path) -> None:
 
 def _save_density(
     path: Path,
-    columns: dict[str, NDArray[Any]],
+    estimator: SuccessEstimator,
     method: str,
     starts: StartSet,
     p_WG: Vector,
     choices: list[tuple[str, Vector]],
 ) -> None:
-    rows = PLANAR_LIC1.rows(columns)
-    estimator = make_estimator(method).fit(rows.Z, rows.f, rows.environment)
     line = starts.line
     y = np.linspace(line.lower[1], line.upper[1], DENSITY_SHAPE[0])
     phi = np.linspace(line.lower[2], line.upper[2], DENSITY_SHAPE[1])

@@ -36,7 +36,7 @@ class LicSelector:
     ) -> None:
         self.method = method
         self._arm = arm
-        self._estimator = estimator
+        self.estimator = estimator
         self._features = features
         self._program = StartProgram(arm.kinematics, estimator, features)
 
@@ -64,7 +64,7 @@ class LicSelector:
     def evaluate(self, p_WG: Vector, x0: Vector) -> Vector:
         """Returns the unclipped estimate at start poses, shape (n, 3) -> (n,)."""
         Z = self._features.join(p_WG, x0)
-        return np.array([self._estimator.value_and_gradient(z)[0] for z in Z])
+        return np.array([self.estimator.value_and_gradient(z)[0] for z in Z])
 
     def _candidates(self, situation: Situation) -> Vector:
         """Returns the library's own starts and a lattice, without those near failed starts."""
@@ -117,7 +117,7 @@ class LbfgsbSelector(LicSelector):
         def cost(y_s: Vector) -> tuple[float, Vector]:
             x0, by_y_s = pose(y_s)
             z = self._features.join(situation.p_WG, x0)
-            value, by_z = self._estimator.value_and_gradient(z)
+            value, by_z = self.estimator.value_and_gradient(z)
             return -value, -self._features.gradient_by_x0(by_z) @ by_y_s
 
         ends, _ = starts.phi_range(guess[1])
