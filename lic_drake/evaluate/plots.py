@@ -51,6 +51,8 @@ def draw_density(
             color=ATTEMPT_COLORS[i % len(ATTEMPT_COLORS)],
             markeredgecolor="white",
             linestyle="none",
+            clip_on=False,
+            zorder=5,
             label=label,
         )
     ax.set(xlabel="start position y [m]", ylabel="start orientation φ [rad]")
