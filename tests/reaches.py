@@ -1,8 +1,10 @@
 """Real reaches for tests: small scenarios, requests for them, and where a hand can start."""
 
+import math
+
 import numpy as np
 
-from lic_drake.reach.request import ReachRequest
+from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.scenario import Scenario, load_scenario
 
 START_Y_M, START_PHI_DEG = 0.0, 60.0
@@ -50,3 +52,15 @@ def start_angles(scenario: Scenario) -> np.ndarray:
     q = scenario.arm().solve_ik(np.array(reach_request(scenario).start))
     assert q is not None
     return q
+
+
+MEASURED = (
+    *("final_x", "final_y", "final_phi", "final_vx", "final_vy"),
+    *("min_distance", "peak_force", "mean_force", "mean_contacts"),
+)
+
+
+def assert_never_began(record: ReachRecord, outcome: str) -> None:
+    assert (record.outcome, record.success, record.duration_s) == (outcome, False, 0.0)
+    assert all(math.isnan(getattr(record, name)) for name in MEASURED)
+    assert (record.q_start, record.q_final, record.peak_contacts) == ((), (), 0)

@@ -1,18 +1,22 @@
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from fake_reach import comparable
-from pydrake.systems.analysis import Simulator
-from reaches import free_space, reach_request, small_clutter, start_angles
+from reaches import (
+    MEASURED,
+    assert_never_began,
+    free_space,
+    reach_request,
+    small_clutter,
+    start_angles,
+)
 from worlds import box, cylinder, make_clutter
 
 from lic_drake.clutter.instance import ClutterInstance
-from lic_drake.control import tactile_sensor
-from lic_drake.control.mpc import HapticMpc
 from lic_drake.reach import rollout as dut
 from lic_drake.reach.diagram import make_reach_diagram
 from lic_drake.reach.request import ReachRecord, ReachRequest
@@ -22,10 +26,6 @@ from lic_drake.reach.trace import ReachResult, ReachTrace
 
 FREE = free_space()
 X0 = np.array(reach_request(FREE).start)
-MEASURED = (
-    *("final_x", "final_y", "final_phi", "final_vx", "final_vy"),
-    *("min_distance", "peak_force", "mean_force", "mean_contacts"),
-)
 
 
 @pytest.fixture(autouse=True)
@@ -107,12 +107,6 @@ def test_time_runs_out_at_the_sample_of_the_timeout() -> None:
     assert (record.outcome, record.duration_s) == ("timeout", 0.4)
 
 
-def assert_never_began(record: ReachRecord, outcome: str) -> None:
-    assert (record.outcome, record.success, record.duration_s) == (outcome, False, 0.0)
-    assert all(math.isnan(getattr(record, name)) for name in MEASURED)
-    assert (record.q_start, record.q_final, record.peak_contacts) == ((), (), 0)
-
-
 @pytest.mark.parametrize("goal", [(0.9, 0.3), (-5.0, 5.0), (math.nan, 0.0), (math.inf, 0.0)])
 def test_goals_out_of_reach_are_not_simulated(goal: tuple[float, float]) -> None:
     record = run_reach(reach_request(FREE, goal))
@@ -175,98 +169,6 @@ def test_the_figures_of_a_record_come_from_the_trace(outcome: str, vx: float) ->
     assert record.mean_contacts == pytest.approx(1.0, abs=0.01)
     assert record.duration_s == pytest.approx(2.0 + still_s)
     assert (record.wall_time_s, record.detail) == (1.5, "why")
-
-
-# Failures of the simulation
-
-
-class Failing(Simulator):
-    """A simulator that fails after three control periods, in Drake's way."""
-
-    def AdvanceTo(self, boundary_time: float, *args: Any, **values: Any) -> Any:
-        if boundary_time > 0.13:
-            raise RuntimeError("The solver\n  failed to converge at t = 0.12")
-        return super().AdvanceTo(boundary_time, *args, **values)
-
-
-def test_a_solver_failure_is_an_outcome_with_what_was_measured_before(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(dut, "Simulator", Failing)
-    record = run_reach(reach_request(FREE))
-    assert (record.outcome, record.success) == ("diverged", False)
-    assert record.detail == "The solver failed to converge at t = 0.12"
-    assert record.duration_s == pytest.approx(0.12)
-    assert math.isfinite(record.final_x) and len(record.q_final) == 3
-
-
-def failing_after(calls: int, original: Callable[..., Any], failure: Any) -> Callable[..., Any]:
-    """Returns the function with a failure, raised or returned, after some calls."""
-    count = 0
-
-    def function(*args: Any) -> Any:
-        nonlocal count
-        count += 1
-        if count <= calls:
-            return original(*args)
-        if isinstance(failure, Exception):
-            raise failure
-        return failure
-
-    return function
-
-
-@pytest.mark.parametrize(
-    "failure",
-    [
-        np.linalg.LinAlgError("Matrix is not positive definite"),
-        FloatingPointError("overflow"),
-        ValueError("array must not contain infs or NaNs"),
-    ],
-)
-def test_a_failure_of_the_controllers_mathematics_is_an_outcome(
-    monkeypatch: pytest.MonkeyPatch, failure: Exception
-) -> None:
-    monkeypatch.setattr(HapticMpc, "step", failing_after(5, HapticMpc.step, failure))
-    record = run_reach(reach_request(FREE))
-    assert (record.outcome, record.detail) == ("diverged", str(failure))
-    assert record.duration_s == pytest.approx(0.2)
-
-
-def test_a_failure_while_the_taxels_are_read_is_an_outcome(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    failing = failing_after(7, tactile_sensor.read_patches, RuntimeError("contact solver"))
-    monkeypatch.setattr(tactile_sensor, "read_patches", failing)
-    record = run_reach(reach_request(FREE))
-    assert (record.outcome, record.detail) == ("diverged", "contact solver")
-
-
-def test_joint_angles_that_are_no_numbers_are_an_outcome(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(HapticMpc, "step", failing_after(5, HapticMpc.step, np.full(3, np.nan)))
-    record = run_reach(reach_request(FREE))
-    assert record.outcome == "diverged"
-    assert record.detail
-    assert all(math.isfinite(value) for value in record.q_final)
-
-
-def test_a_reach_that_fails_before_its_first_sample_has_no_measurements(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(Failing, "AdvanceTo", failing_after(0, print, RuntimeError("x" * 1000)))
-    monkeypatch.setattr(dut, "Simulator", Failing)
-    record = run_reach(reach_request(FREE))
-    assert_never_began(record, "diverged")
-    assert record.detail == "x" * 200
-
-
-def test_the_next_reach_is_not_harmed_by_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
-    request = reach_request(small_clutter(1.0))
-    expected = run_reach(request)
-    with monkeypatch.context() as patch:
-        patch.setattr(dut, "Simulator", Failing)
-        assert run_reach(request).outcome == "diverged"
-    assert run_reach(request) == expected
 
 
 # The record is a function of the request
