@@ -1,6 +1,7 @@
 """What subcommands share when they declare their arguments."""
 
 import argparse
+from pathlib import Path
 
 type Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
 """What `add_parser` of a subcommand gets."""
@@ -42,4 +43,24 @@ def add_scenario_arguments(parser: argparse.ArgumentParser) -> None:
         default="",
         help='values put over the scenario, for instance "{stop: {timeout_s: 20}}", SI units'
         " (default: none)",
+    )
+
+
+def add_method_argument(parser: argparse.ArgumentParser) -> None:
+    """Adds --method, the strategy that selects."""
+    parser.add_argument(
+        "--method",
+        default="gp",
+        metavar="NAME",
+        help="rnd, cost, knn, gp or gp-raw (default: %(default)s)",
+    )
+
+
+def add_library_argument(parser: argparse.ArgumentParser) -> None:
+    """Adds --library, what strategies learn from."""
+    parser.add_argument(
+        "--library",
+        type=Path,
+        metavar="FOLDER",
+        help="experience library (default: the shipped one for cylinder-clutter)",
     )

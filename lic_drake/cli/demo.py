@@ -3,7 +3,12 @@
 import argparse
 from pathlib import Path
 
-from lic_drake.cli.arguments import Subparsers, non_negative_int
+from lic_drake.cli.arguments import (
+    Subparsers,
+    add_library_argument,
+    add_method_argument,
+    non_negative_int,
+)
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -24,18 +29,8 @@ def add_parser(subparsers: Subparsers) -> None:
         metavar="N",
         help="chooses environment and goal (default: 0)",
     )
-    parser.add_argument(
-        "--method",
-        default="gp",
-        metavar="NAME",
-        help="rnd, cost, knn, gp or gp-raw (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--library",
-        type=Path,
-        metavar="FOLDER",
-        help="experience library (default: the shipped one for cylinder-clutter)",
-    )
+    add_method_argument(parser)
+    add_library_argument(parser)
     parser.add_argument(
         "--out", type=Path, default=Path("out"), help="folder to write to (default: %(default)s)"
     )

@@ -4,7 +4,7 @@ import argparse
 import os
 from pathlib import Path
 
-from lic_drake.cli.arguments import Subparsers, positive_int
+from lic_drake.cli.arguments import Subparsers, add_library_argument, positive_int
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -40,12 +40,7 @@ def add_parser(subparsers: Subparsers) -> None:
             metavar="N",
             help=f"{text} (default: %(default)s)",
         )
-    parser.add_argument(
-        "--library",
-        type=Path,
-        metavar="FOLDER",
-        help="experience library (default: the shipped one for cylinder-clutter)",
-    )
+    add_library_argument(parser)
     parser.set_defaults(run=run)
 
 

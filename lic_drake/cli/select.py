@@ -2,9 +2,13 @@
 
 import argparse
 import json
-from pathlib import Path
 
-from lic_drake.cli.arguments import Subparsers, non_negative_int
+from lic_drake.cli.arguments import (
+    Subparsers,
+    add_library_argument,
+    add_method_argument,
+    non_negative_int,
+)
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -24,12 +28,7 @@ def add_parser(subparsers: Subparsers) -> None:
         metavar=("X", "Y"),
         help="goal in metres (no default: must be given)",
     )
-    parser.add_argument(
-        "--method",
-        default="gp",
-        metavar="NAME",
-        help="rnd, cost, knn, gp or gp-raw (default: %(default)s)",
-    )
+    add_method_argument(parser)
     parser.add_argument(
         "--failed",
         type=float,
@@ -40,12 +39,7 @@ def add_parser(subparsers: Subparsers) -> None:
         help="start (metres, degrees) of an attempt that failed; may be given several times"
         " (default: none)",
     )
-    parser.add_argument(
-        "--library",
-        type=Path,
-        metavar="FOLDER",
-        help="experience library (default: the shipped one for cylinder-clutter)",
-    )
+    add_library_argument(parser)
     parser.add_argument(
         "--seed", type=non_negative_int, default=0, metavar="N", help="for rnd (default: 0)"
     )
