@@ -2,9 +2,10 @@
 
 The controller's programs have few variables and cost terms that differ by six orders of
 magnitude, at which interior-point solvers with absolute tolerances give up (Drake's Clarabel:
-"InsufficientProgress" in thousands of steps of the 100 Hz preset). With the cost's Cholesky factor the problem
-becomes that of the point nearest to the origin in a polyhedron, which non-negative least squares
-solves in a finite number of steps (Lawson and Hanson, Solving Least Squares Problems, ch. 23).
+"InsufficientProgress" in thousands of steps of the 100 Hz preset). With the cost's Cholesky
+factor the problem becomes that of the point nearest to the origin in a polyhedron, which
+non-negative least squares solves in a finite number of steps (Lawson and Hanson, Solving Least
+Squares Problems, ch. 23).
 """
 
 from dataclasses import dataclass
