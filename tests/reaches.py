@@ -3,7 +3,9 @@
 import math
 
 import numpy as np
+from pydrake.systems.framework import Context
 
+from lic_drake.reach.diagram import ReachDiagram
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.scenario import Scenario, load_scenario
 
@@ -52,6 +54,13 @@ def start_angles(scenario: Scenario) -> np.ndarray:
     q = scenario.arm().solve_ik(np.array(reach_request(scenario).start))
     assert q is not None
     return q
+
+
+def start_context(reach_diagram: ReachDiagram, q: np.ndarray, p_WG: np.ndarray) -> Context:
+    """A new context in which the arm rests at q and the goal is p_WG."""
+    context = reach_diagram.diagram.CreateDefaultContext()
+    reach_diagram.set_start(context, q, p_WG)
+    return context
 
 
 MEASURED = (

@@ -17,11 +17,11 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from reaches import free_space, reach_request, small_clutter, start_angles
+from reaches import free_space, reach_request, small_clutter
 from worlds import box, cylinder, make_clutter
 
 from lic_drake.control.mpc import HapticMpc
-from lic_drake.reach import recording, rollout
+from lic_drake.reach import recording, rollout, waking
 from lic_drake.reach.diagram import ReachDiagram, make_reach_diagram
 from lic_drake.reach.recording import ReachRecording
 from lic_drake.reach.rollout import Environment, run_reach
@@ -44,7 +44,7 @@ def built(monkeypatch: pytest.MonkeyPatch) -> Iterator[list["weakref.ref[Any]"]]
         return reach_diagram
 
     rollout._recent.clear()
-    for module in (rollout, recording):
+    for module in (rollout, recording, waking):
         monkeypatch.setattr(module, "make_reach_diagram", make)
     yield references
     rollout._recent.clear()
@@ -100,7 +100,7 @@ def test_failures_and_invalid_starts_leave_nothing(
 def test_a_recording_dies(built: list["weakref.ref[Any]"], tmp_path: Path) -> None:
     scenario = free_space(0.2)
     recorded = ReachRecording(scenario, make_clutter(cylinder(0.5, 0.3, movable=True)))
-    recorded.add_reach(start_angles(scenario), np.array([0.6, 0.1, 0.0]))
+    recorded.add_reach(np.array(reach_request(scenario).start), np.array([0.6, 0.1, 0.0]))
     recorded.save(tmp_path / "reach.html")
     assert alive(built)
     del recorded

@@ -126,7 +126,7 @@ def make_world(
 ) -> World:
     """Builds a world at rest with the equilibrium angles q; `extend` may add systems."""
     builder = DiagramBuilder()
-    scene = add_scene(builder, ARM, clutter, config)
+    scene = add_scene(builder, ARM, clutter, config, visuals=True)
     extend(builder, scene)
     diagram = builder.Build()
     context = diagram.CreateDefaultContext()

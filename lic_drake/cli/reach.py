@@ -140,13 +140,13 @@ def _record(request: "ReachRequest", path: Path) -> None:
     from lic_drake.reach.recording import ReachRecording
 
     scenario = request.scenario
-    q0 = scenario.arm().solve_ik(np.array(request.start))
-    if q0 is None:
+    x0 = np.array(request.start)
+    if scenario.arm().solve_ik(x0) is None:
         return
     recording = ReachRecording(
         scenario, scenario.sample_instance(request.stream, request.environment)
     )
-    recording.add_reach(q0, np.array(request.goal))
+    recording.add_reach(x0, np.array(request.goal))
     recording.save(path)
 
 

@@ -11,10 +11,12 @@ Jacobians J_i, a change dphi of the equilibrium angles moves the joints and forc
 Source of the problem's terms: gt-ros-pkg/hrl-haptic-manip (facts only). No Drake here.
 """
 
-from dataclasses import dataclass
+import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dposv
 
 from lic_drake.control.mpc_config import MpcConfig
 from lic_drake.control.quadratic_program import QuadraticProgram, solve
@@ -22,8 +24,7 @@ from lic_drake.control.quadratic_program import QuadraticProgram, solve
 Vector = NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True)
-class MpcInput:
+class MpcInput(NamedTuple):
     """What the controller knows at a step; m joints, n contacts, all vectors in R.
 
     Attributes:
@@ -45,8 +46,7 @@ class MpcInput:
     Jv_C: Vector
 
 
-@dataclass(frozen=True, kw_only=True)
-class Prediction:
+class Prediction(NamedTuple):
     """Linear maps from dphi to what a step does.
 
     Attributes:
@@ -65,9 +65,13 @@ class HapticMpc:
 
     def __init__(self, config: MpcConfig, stiffness: Vector, q_min: Vector, q_max: Vector) -> None:
         self.config = config
-        self._stiffness = stiffness
+        self._K = np.diag(stiffness)
+        self._effort = config.torque_change_weight * self._K**2
         self._q_min = q_min
         self._q_max = q_max
+        self._max_change = np.deg2rad(config.max_change_deg)
+        self._max_windup = np.deg2rad(config.max_windup_deg)
+        self._reset_windup = np.deg2rad(config.reset_windup_deg)
 
     def step(self, state: MpcInput) -> Vector:
         """Returns the change of the equilibrium angles, shape (m,), radians.
@@ -79,21 +83,21 @@ class HapticMpc:
 
     def pull_back(self, q: Vector, q_d: Vector) -> Vector:
         """Returns equilibrium angles no further than the wind-up reset from the joint angles."""
-        limit = np.deg2rad(self.config.reset_windup_deg)
-        return np.clip(q_d, q - limit, q + limit)
+        limit = self._reset_windup
+        pulled: Vector = np.minimum(np.maximum(q_d, q - limit), q + limit)
+        return pulled
 
     def predict(self, state: MpcInput) -> Prediction:
         """Returns the quasi-static model at a state."""
         contact = self.config.contact_stiffness_N_per_m
         # Rows n_i' J_i: motion of each contact along its normal.
-        rows = np.einsum("ij,ijk->ik", state.normals, state.Jv_C)
-        K = np.diag(self._stiffness)
-        S = np.linalg.solve(K + contact * rows.T @ rows, K)
+        rows = (state.normals[:, None] @ state.Jv_C)[:, 0]
+        _, S, _ = dposv(self._K + contact * rows.T @ rows, self._K)
         return Prediction(joint=S, tip=state.Jv_E @ S, force=contact * rows @ S)
 
     def wanted_tip_motion(self, p_EG: Vector) -> Vector:
         """Returns the tip motion of this step towards the goal, shape (3,), metres."""
-        distance = float(np.linalg.norm(p_EG))
+        distance = math.sqrt(p_EG @ p_EG)
         slow = max(self.config.slow_distance_m, self.config.tip_step_m)
         return p_EG * (self.config.tip_step_m / max(distance, slow))
 
@@ -103,15 +107,13 @@ class HapticMpc:
         model = self.predict(state)
         over = state.forces > config.force_threshold_N
 
-        weight = config.position_weight
-        P = weight * model.tip.T @ model.tip
-        c = -weight * model.tip.T @ self.wanted_tip_motion(state.p_EG)
-        P = P + config.torque_change_weight * np.diag(self._stiffness**2)
-        if np.any(over):
-            share = np.count_nonzero(over) if config.force_weight_shared else 1
+        P = config.position_weight * model.tip.T @ model.tip + self._effort
+        c = -config.position_weight * self.wanted_tip_motion(state.p_EG) @ model.tip
+        if over.any():
             rows = model.force[over]
-            P = P + config.force_weight / share * rows.T @ rows
-            c = c + config.force_weight / share * config.force_decrease_N * rows.sum(axis=0)
+            weight = config.force_weight / (len(rows) if config.force_weight_shared else 1)
+            P = P + weight * rows.T @ rows
+            c = c + weight * config.force_decrease_N * rows.sum(axis=0)
 
         # How far each force may rise or fall in a step, and each joint may go.
         margin = config.force_threshold_N - state.forces
@@ -124,19 +126,18 @@ class HapticMpc:
         return QuadraticProgram(
             P=2.0 * P,
             c=2.0 * c,
-            A=np.vstack([model.force, model.joint]),
-            row_min=np.concatenate([-fall, down]),
-            row_max=np.concatenate([rise, up]),
+            A=np.concatenate((model.force, model.joint)),
+            row_min=np.concatenate((-fall, down)),
+            row_max=np.concatenate((rise, up)),
             x_min=x_min,
             x_max=x_max,
         )
 
     def _equilibrium_bounds(self, state: MpcInput) -> tuple[Vector, Vector]:
         """Returns the bounds of dphi itself: rate, wind-up and joint limits."""
-        rate = np.deg2rad(self.config.max_change_deg)
-        windup = np.deg2rad(self.config.max_windup_deg)
-        low = np.maximum(-rate, state.q - windup - state.q_d)
-        high = np.minimum(rate, state.q + windup - state.q_d)
+        wound = state.q - state.q_d
+        low = np.maximum(-self._max_change, wound - self._max_windup)
+        high = np.minimum(self._max_change, wound + self._max_windup)
         if self.config.equilibrium_in_limits:
             low = np.maximum(low, np.minimum(self._q_min - state.q_d, 0.0))
             high = np.minimum(high, np.maximum(self._q_max - state.q_d, 0.0))

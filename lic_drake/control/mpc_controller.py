@@ -40,26 +40,27 @@ class HapticMpcController(LeafSystem):
         context.SetDiscreteState(self._desired, np.append(q_d, np.zeros(self._num_joints)))
 
     def _update(self, context: Context, discrete_state: DiscreteValues) -> None:
-        q = np.asarray(self._arm_state.Eval(context))[: self._num_joints]
+        m = self._num_joints
+        q = np.asarray(self._arm_state.Eval(context))[:m]
         taxel_force = np.asarray(self._taxel_force.Eval(context))
         p_RG = np.asarray(self._goal.Eval(context))
-        held = context.get_discrete_state(self._desired).value()[: self._num_joints]
+        held = context.get_discrete_state(self._desired).value()[:m]
         q_d = self._mpc.pull_back(q, held)
 
         loaded = np.flatnonzero(taxel_force > self._mpc.config.force_trim_N)
         links = self._layout.link[loaded]
         R_RL, p_RL = self._arm.link_poses(q)
         turn = R_RL[links]
-        p_RC = p_RL[links] + np.einsum("ijk,ik->ij", turn, self._layout.p_LT[loaded])
+        p_RC = p_RL[links] + np.vecdot(turn, self._layout.p_LT[loaded, None])
         state = MpcInput(
             q=q,
             q_d=q_d,
             p_EG=p_RG - self._arm.tip_position(q),
             Jv_E=self._arm.tip_jacobian(q),
-            normals=np.einsum("ijk,ik->ij", turn, self._layout.n_L[loaded]),
+            normals=np.vecdot(turn, self._layout.n_L[loaded, None]),
             forces=taxel_force[loaded],
             Jv_C=self._arm.point_jacobians(q, links, p_RC),
         )
-        discrete_state.set_value(
-            self._desired, np.append(q_d + self._mpc.step(state), np.zeros(self._num_joints))
-        )
+        desired = np.zeros(2 * m)
+        desired[:m] = q_d + self._mpc.step(state)
+        discrete_state.set_value(self._desired, desired)

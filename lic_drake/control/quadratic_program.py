@@ -8,10 +8,12 @@ non-negative least squares solves in a finite number of steps (Lawson and Hanson
 Squares Problems, ch. 23).
 """
 
-from dataclasses import dataclass
+import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dpotrf, dtrtri
 from scipy.optimize import nnls
 
 Vector = NDArray[np.float64]
@@ -23,8 +25,7 @@ _TOLERANCE = 1e-8
 """An answer keeps its limits to this part of its distance, or there is none."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class QuadraticProgram:
+class QuadraticProgram(NamedTuple):
     """Minimise 1/2 x'Px + c'x subject to row_min <= Ax <= row_max and x_min <= x <= x_max.
 
     Attributes:
@@ -55,34 +56,41 @@ def solve(problem: QuadraticProgram) -> Vector | None:
         numpy.linalg.LinAlgError: P is not positive definite.
     """
     # With P = L L', y = L'x - y_free has the cost 1/2 |y|^2; y_free is the free optimum.
-    L_inv = np.linalg.inv(np.linalg.cholesky(problem.P))
+    L, failed = dpotrf(problem.P, lower=True)
+    if failed:
+        raise np.linalg.LinAlgError("the cost of a quadratic program is not positive definite")
+    L_inv, _ = dtrtri(L, lower=True)
     y_free = -L_inv @ problem.c
-    rows = np.vstack([problem.A, np.eye(len(problem.c))]) @ L_inv.T
-    low = np.concatenate([problem.row_min, problem.x_min])
-    high = np.concatenate([problem.row_max, problem.x_max])
-    G = np.vstack([rows[np.isfinite(low)], -rows[np.isfinite(high)]])
-    h = np.concatenate([low[np.isfinite(low)], -high[np.isfinite(high)]]) - G @ y_free
-    norms = np.linalg.norm(G, axis=1)
+    rows = np.concatenate((problem.A @ L_inv.T, L_inv.T))
+    G = np.concatenate((rows, -rows))
+    h = np.concatenate((problem.row_min, problem.x_min, -problem.row_max, -problem.x_max))
+    h -= G @ y_free
+    norms = np.sqrt(np.vecdot(G, G))
     empty = norms < 1e-12
-    if np.any(h[empty] > 1e-12):
+    if empty.any() and (h[empty] > 1e-12).any():
         return None
-    y = _nearest_to_origin(G[~empty] / norms[~empty, None], h[~empty] / norms[~empty])
+    used = (h != -np.inf) & ~empty
+    G, h, norms = G[used], h[used], norms[used]
+    y = _nearest_to_origin(G / norms[:, None], h / norms)
     return None if y is None else L_inv.T @ (y + y_free)
 
 
 def _nearest_to_origin(G: Vector, h: Vector) -> Vector | None:
     """Returns the shortest y with G y >= h, rows of G of unit length, or None."""
-    worst = np.max(h, initial=0.0)
-    if worst <= 0.0:
-        return np.zeros(G.shape[1])
-    f = np.append(np.zeros(G.shape[1]), 1.0)
-    for unit in worst * np.array(_SCALES):
-        E = np.vstack([G.T, h / unit])
+    n = G.shape[1]
+    if len(h) == 0 or (worst := float(h.max())) <= 0.0:
+        return np.zeros(n)
+    f = np.zeros(n + 1)
+    f[n] = 1.0
+    for scale in _SCALES:
+        unit = scale * worst
+        E = np.concatenate((G.T, h[None] / unit))
         multipliers, _ = nnls(E, f, maxiter=100 * len(h))
         residual = E @ multipliers - f
         # The residual is zero, but for rounding, when the constraints contradict each other.
         if residual[-1] < 0.0:
-            y: Vector = -unit * residual[:-1] / residual[-1]
-            if np.all(G @ y >= h - _TOLERANCE * max(worst, float(np.linalg.norm(y)))):
+            y: Vector = residual[:-1] * (-unit / residual[-1])
+            size = math.sqrt(y @ y)
+            if (h - G @ y).max() <= _TOLERANCE * max(worst, size):
                 return y
     return None

@@ -1,29 +1,31 @@
 """From contact patches to one normal force a taxel. No Drake here."""
 
-from dataclasses import dataclass
+import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lic_drake.control.taxels import TaxelLayout
+from lic_drake.control.taxels import LinkTaxels, TaxelLayout
 
 MAX_ANGLE_COS = np.cos(np.deg2rad(45.0))
 """A taxel takes a force only from within 45 degrees of its normal (authors' simulator)."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class ContactPatch:
+class ContactPatch(NamedTuple):
     """One contact of a link with one object.
 
     Attributes:
         link: Index of the link.
         p_RQ: Centres of the patch's faces (one for a point contact), shape (k, 3), metres.
-        f_R: Normal forces of the link on the object at the faces, shape (k, 3), N.
+        n_R: Unit normals of the faces, out of the link, shape (k, 3).
+        force: Normal forces of the link on the object at the faces, shape (k,), N.
     """
 
     link: int
     p_RQ: NDArray[np.float64]
-    f_R: NDArray[np.float64]
+    n_R: NDArray[np.float64]
+    force: NDArray[np.float64]
 
 
 def calc_taxel_forces(
@@ -45,37 +47,32 @@ def calc_taxel_forces(
         patches: The contacts.
     """
     forces = np.zeros(layout.num_taxels)
-    for patch in patches:
-        magnitudes = np.linalg.norm(patch.f_R, axis=1)
-        total = magnitudes.sum()
+    for link, p_RQ, n_R, force in patches:
+        total = force.sum()
         if total <= 0.0:
             continue
-        mine = np.flatnonzero(layout.link == patch.link)
-        R, p = R_RL[patch.link], p_RL[patch.link]
-        p_RT = p + layout.p_LT[mine] @ R.T
-        taxels = np.argmin(np.sum((patch.p_RQ[:, None] - p_RT) ** 2, axis=2), axis=1)
-        span = np.ptp(p_RT[taxels], axis=0)
+        mine, R = layout.of_link[link], R_RL[link]
+        p_LQ = (p_RQ - p_RL[link]) @ R
+        under = mine.compare_distances(p_LQ).argmin(axis=1)
+        p_LT = mine.p_LT[under]
+        span = p_LT.max(axis=0) - p_LT.min(axis=0)
         if span @ span <= (1.5 * layout.pitch_m) ** 2:
-            p_RC = magnitudes @ patch.p_RQ / total
-            # Not the sum of the faces' magnitudes: the facets of a coarse contact mesh and the
-            # sides of a corner splay their forces.
-            f_R = patch.f_R.sum(axis=0)
-            taxel = _nearest_facing(p_RT, layout.n_L[mine] @ R.T, p_RC, f_R)
-            forces[mine[taxel]] += np.linalg.norm(f_R)
+            # Not the sum of the faces' forces: the facets of a coarse contact mesh and the sides
+            # of a corner splay them.
+            f_L = force @ n_R @ R
+            size = math.sqrt(f_L @ f_L)
+            taxel = _nearest_facing(mine, force @ p_LQ / total, f_L)
+            forces[mine.taxels[taxel]] += size
         else:
-            np.add.at(forces, mine[taxels], magnitudes)
+            np.add.at(forces, mine.taxels[under], force)
     return forces
 
 
 def _nearest_facing(
-    p_RT: NDArray[np.float64],
-    n_R: NDArray[np.float64],
-    p_RC: NDArray[np.float64],
-    f_R: NDArray[np.float64],
+    mine: LinkTaxels, p_LC: NDArray[np.float64], f_L: NDArray[np.float64]
 ) -> np.intp:
     """Returns the taxel nearest to the contact point C among those that face its force."""
-    facing = n_R @ f_R >= MAX_ANGLE_COS * np.linalg.norm(f_R)
-    if not np.any(facing):  # Then the nearest one takes it: no force is lost.
-        facing[:] = True
-    distance = np.sum((p_RC - p_RT) ** 2, axis=1)
-    return np.argmin(np.where(facing, distance, np.inf))
+    facing = mine.n_L @ f_L >= MAX_ANGLE_COS * math.sqrt(f_L @ f_L)
+    distance = mine.compare_distances(p_LC)
+    # Where none faces it the nearest one takes it: no force is lost.
+    return np.argmin(np.where(facing, distance, np.inf) if facing.any() else distance)

@@ -90,10 +90,12 @@ def _read_surface(
         return None
     pressure = surface.poly_e_MN()
     faces = range(surface.num_faces())
-    p_WQ = np.array([surface.centroid(i) for i in faces])
-    magnitude = [pressure.EvaluateCartesian(i, p_WQ[i]) * surface.area(i) for i in faces]
-    normal = np.array([surface.face_normal(i) for i in faces])
-    return ContactPatch(link=link, p_RQ=p_WQ, f_R=sign * np.array(magnitude)[:, None] * normal)
+    p_WQ = [surface.centroid(i) for i in faces]
+    normal = [surface.face_normal(i) for i in faces]
+    force = [pressure.EvaluateCartesian(i, p_WQ[i]) * surface.area(i) for i in faces]
+    return ContactPatch(
+        link=link, p_RQ=np.array(p_WQ), n_R=sign * np.array(normal), force=np.array(force)
+    )
 
 
 def _read_point(
@@ -106,8 +108,11 @@ def _read_point(
         link, sign = link_of(pair.id_B), -1.0
     if link is None:
         return None
-    normal = -np.asarray(pair.nhat_BA_W)
-    f_Bc_W = max(0.0, float(normal @ info.contact_force())) * normal
+    n_R = -sign * np.asarray(pair.nhat_BA_W)
+    force = max(0.0, float(sign * n_R @ info.contact_force()))
     return ContactPatch(
-        link=link, p_RQ=np.asarray(info.contact_point())[None], f_R=sign * f_Bc_W[None]
+        link=link,
+        p_RQ=np.asarray(info.contact_point())[None],
+        n_R=n_R[None],
+        force=np.array([force]),
     )

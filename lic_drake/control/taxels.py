@@ -1,6 +1,8 @@
 """Where the taxels are on the arm's surface."""
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +11,32 @@ from lic_drake.robots.arm import SkinCapsule
 
 CAP_ANGLES_DEG = (-72.0, -36.0, 0.0, 36.0, 72.0)
 """Directions of the taxels on an end cap, from the capsule's axis (authors' simulator)."""
+
+
+class LinkTaxels(NamedTuple):
+    """The taxels of one link, in its frame.
+
+    Attributes:
+        taxels: Their indices among those of the whole arm, shape (n,).
+        p_LT: Positions, shape (n, 3), metres.
+        n_L: Outward unit normals, shape (n, 3).
+        half_square: Half of each position's squared length, shape (n,), square metres.
+    """
+
+    taxels: NDArray[np.intp]
+    p_LT: NDArray[np.float64]
+    n_L: NDArray[np.float64]
+    half_square: NDArray[np.float64]
+
+    def compare_distances(self, p_LQ: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Returns what grows with the distance from Q to each taxel, shape (.., n).
+
+        That is 1/2 |p_QT|^2 without the 1/2 |p_LQ|^2 that all taxels have in common.
+
+        Args:
+            p_LQ: One point or many, shape (.., 3), metres.
+        """
+        return self.half_square - p_LQ @ self.p_LT.T
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,6 +59,17 @@ class TaxelLayout:
     def num_taxels(self) -> int:
         """Number of taxels on the whole arm."""
         return len(self.link)
+
+    @cached_property
+    def of_link(self) -> tuple[LinkTaxels, ...]:
+        """The taxels link by link, as the sensor needs them at every control step."""
+        links = []
+        for link in range(self.link.max() + 1):
+            taxels = np.flatnonzero(self.link == link)
+            p_LT = self.p_LT[taxels]
+            half_square = 0.5 * np.sum(p_LT**2, axis=1)
+            links.append(LinkTaxels(taxels, p_LT, self.n_L[taxels], half_square))
+        return tuple(links)
 
 
 def planar_taxels(skin: tuple[SkinCapsule, ...], per_metre: float = 100.0) -> TaxelLayout:

@@ -44,8 +44,18 @@ def simulate_requests(
     scenario: Scenario,
     workers: int,
     say: Callable[[str], None],
+    reach: Callable[[ReachRequest], ReachRecord] = run_reach,
 ) -> dict[str, ReachRecord]:
-    """Returns the records of requests by key, simulating those that the library lacks."""
+    """Returns the records of requests by key, simulating those that the library lacks.
+
+    Args:
+        requests: What to simulate.
+        library: Keeps the records; it exists.
+        scenario: The scenario of all requests.
+        workers: Number of processes.
+        say: Gets a line for every chunk of reaches.
+        reach: Simulates one of them; pickles.
+    """
     records = {record.key: record for record in library.records()} if _has_rows(library) else {}
     missing = list({r.key: r for r in requests if r.key not in records}.values())
     missing.sort(key=lambda request: request.environment)
@@ -56,7 +66,7 @@ def simulate_requests(
     began = time.perf_counter()
     done = successes = 0
     try:
-        for future in as_completed([executor.submit(_run_chunk, chunk) for chunk in chunks]):
+        for future in as_completed([executor.submit(_run_chunk, reach, chunk) for chunk in chunks]):
             rows = future.result()
             library.write_shard(f"reaches-{rows[0].key}", rows, scenario)
             records.update({row.key: row for row in rows})
@@ -73,8 +83,10 @@ def simulate_requests(
     return records
 
 
-def _run_chunk(requests: list[ReachRequest]) -> list[ReachRecord]:
-    return [run_reach(request) for request in requests]
+def _run_chunk(
+    reach: Callable[[ReachRequest], ReachRecord], requests: list[ReachRequest]
+) -> list[ReachRecord]:
+    return [reach(request) for request in requests]
 
 
 def _has_rows(library: ExperienceLibrary) -> bool:

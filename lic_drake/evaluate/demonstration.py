@@ -102,7 +102,7 @@ def demonstrate(
         )
         request = make_request(scenario, "evaluation", seed, p_WG, selection.x0)
         began = time.perf_counter()
-        result = recording.add_reach(selection.q, p_WG)
+        result = recording.add_reach(selection.x0, p_WG)
         record = make_record(request, result, time.perf_counter() - began)
         say(
             f"attempt {number}: {record.outcome} after {record.duration_s:.1f} s, nearest to the"

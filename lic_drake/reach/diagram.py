@@ -30,21 +30,23 @@ class ReachDiagram:
     controller: HapticMpcController
     visualizer: MeshcatVisualizer | None
 
-    def make_context(self, q: NDArray[np.float64], p_WG: NDArray[np.float64]) -> Context:
-        """Returns a context in which the arm rests at q and the goal is p_WG."""
-        context = self.diagram.CreateDefaultContext()
+    def set_start(
+        self, context: Context, q: NDArray[np.float64], p_WG: NDArray[np.float64]
+    ) -> None:
+        """Puts the arm at rest at q, with the goal p_WG, in a context of the diagram."""
         plant = self.scene.plant
-        plant.SetPositions(plant.GetMyMutableContextFromRoot(context), self.scene.arm, q)
+        x = np.append(q, np.zeros(len(q)))
+        plant.SetPositionsAndVelocities(
+            plant.GetMyMutableContextFromRoot(context), self.scene.arm, x
+        )
         self.controller.set_equilibrium(self.controller.GetMyMutableContextFromRoot(context), q)
         self.diagram.GetInputPort("goal").FixValue(context, p_WG)
-        return context
 
 
 def make_reach_diagram(
     scenario: Scenario,
     instance: ClutterInstance,
     meshcat: Meshcat | None = None,
-    frames_per_second: float = 30.0,
 ) -> ReachDiagram:
     """Builds the diagram of one environment.
 
@@ -52,12 +54,11 @@ def make_reach_diagram(
         scenario: Robot, contact, controller.
         instance: The clutter.
         meshcat: Where to draw the scene and its contact forces, if anywhere.
-        frames_per_second: How often to draw, 1/s.
     """
     builder = DiagramBuilder()
     arm = scenario.arm()
     layout = planar_taxels(arm.skin)
-    scene = add_scene(builder, arm, instance, scenario.scene)
+    scene = add_scene(builder, arm, instance, scenario.scene, visuals=meshcat is not None)
     plant = scene.plant
     plant.set_name("plant")
 
@@ -92,16 +93,13 @@ def make_reach_diagram(
             builder,
             scene.scene_graph,
             meshcat,
-            MeshcatVisualizerParams(
-                role=Role.kIllustration, publish_period=1.0 / frames_per_second
-            ),
+            MeshcatVisualizerParams(role=Role.kIllustration),
         )
         ContactVisualizer.AddToBuilder(
             builder,
             plant,
             meshcat,
             ContactVisualizerParams(
-                publish_period=1.0 / frames_per_second,
                 newtons_per_meter=50.0,
                 force_threshold=0.05,
                 radius=0.003,
@@ -109,4 +107,9 @@ def make_reach_diagram(
         )
     diagram = builder.Build()
     diagram.set_name("reach")
-    return ReachDiagram(diagram=diagram, scene=scene, controller=controller, visualizer=visualizer)
+    return ReachDiagram(
+        diagram=diagram,
+        scene=scene,
+        controller=controller,
+        visualizer=visualizer,
+    )

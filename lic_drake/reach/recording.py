@@ -7,16 +7,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.geometry import Cylinder, Meshcat, MeshcatParams, Rgba, Sphere
-from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.math import RigidTransform
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import LicError
 from lic_drake.reach.diagram import make_reach_diagram
-from lic_drake.reach.rollout import simulate
+from lic_drake.reach.rollout import Environment
 from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.simulation import Simulation
 from lic_drake.reach.trace import ReachResult
-from lic_drake.scene.culling import select_near, take
-from lic_drake.scene.scene import FIXED_COLOR, MOVABLE_COLOR, make_shape
 
 Vector = NDArray[np.float64]
 
@@ -33,8 +32,7 @@ MAX_FRAMES_PER_SECOND = 30.0
 def frame_rate(control_rate_hz: float) -> float:
     """Returns the frames per second of a recording: the control rate, halved while too high.
 
-    The integrator stops where a frame is drawn; in other instants than the controller's this
-    would change the reach. Halves keep the instants equal to the last bit.
+    Frames show the samples of a reach, every one or every second, fourth and so on.
     """
     rate = control_rate_hz
     while rate > MAX_FRAMES_PER_SECOND:
@@ -45,19 +43,17 @@ def frame_rate(control_rate_hz: float) -> float:
 class ReachRecording:
     """A Meshcat scene of one environment in which reaches are recorded one after another.
 
-    The simulation is the one of `lic_drake.reach.rollout`: objects that it leaves out are drawn,
-    too, but as scenery. Must be used from the thread that made it.
+    A reach is simulated first, as anywhere else, and its samples are drawn afterwards. Must be
+    used from the thread that made it.
     """
 
     def __init__(self, scenario: Scenario, instance: ClutterInstance) -> None:
         self._scenario = scenario
+        self._environment = Environment(scenario, instance)
         self._meshcat = _make_meshcat()
-        frames_per_second = frame_rate(scenario.mpc.rate_hz)
-        keep = select_near(instance, scenario.arm().reach_m)
-        self._diagram = make_reach_diagram(
-            scenario, take(instance, keep), self._meshcat, frames_per_second
-        )
-        self._draw_scenery(take(instance, ~keep))
+        self._frames_per_second = frame_rate(scenario.mpc.rate_hz)
+        diagram = make_reach_diagram(scenario, instance, self._meshcat)
+        self._drawing = Simulation(diagram, scenario.scene)
         self._draw_start_line()
         self._meshcat.SetProperty("/Background", "top_color", [0.97, 0.97, 0.98])
         self._meshcat.SetProperty("/Background", "bottom_color", [0.97, 0.97, 0.98])
@@ -65,21 +61,26 @@ class ReachRecording:
         self._meshcat.SetProperty("/Axes", "visible", False)
         self._meshcat.SetCameraPose(np.array([-0.4, -0.3, 1.05]), np.array([0.45, 0.02, 0.0]))
         self._meshcat.StartRecording(
-            TICKS_PER_FRAME * frames_per_second, set_visualizations_while_recording=False
+            TICKS_PER_FRAME * self._frames_per_second, set_visualizations_while_recording=False
         )
         self._clock_s = 0.0
 
-    def add_reach(self, q0: Vector, p_WG: Vector) -> ReachResult:
+    def add_reach(self, x0: Vector, p_WG: Vector) -> ReachResult:
         """Simulates and records a reach in the environment as it was drawn.
 
         Args:
-            q0: First joint angles, shape (m,), radians.
+            x0: Start pose of the hand.
             p_WG: Goal, shape (3,), metres.
         """
         self._draw_goal(p_WG)
-        result = simulate(self._diagram, self._scenario, q0, p_WG, begin_s=self._clock_s)
-        if result.trace.time_s:
-            self._clock_s += math.ceil(result.trace.time_s[-1] + PAUSE_S)
+        result = self._environment.reach(p_WG, x0, keep_states=True)
+        trace = result.trace
+        every = round(self._scenario.mpc.rate_hz / self._frames_per_second)
+        for k in range(0, len(trace.states), every):
+            self._drawing.set_state(trace.states[k])
+            self._drawing.publish(self._clock_s + trace.time_s[k])
+        if trace.time_s:
+            self._clock_s += math.ceil(trace.time_s[-1] + PAUSE_S)
         return result
 
     def save(self, path: Path) -> None:
@@ -94,15 +95,6 @@ class ReachRecording:
             path.write_text(self._meshcat.StaticHtml(), encoding="utf-8")
         except OSError as error:
             raise LicError(f"cannot write {path}: {error.strerror}") from None
-
-    def _draw_scenery(self, instance: ClutterInstance) -> None:
-        for i in range(instance.num_objects):
-            color = MOVABLE_COLOR if instance.movable[i] else FIXED_COLOR
-            path = f"/scenery/object{i}"
-            shape = make_shape(instance.shape[i], instance.size[i])
-            self._meshcat.SetObject(path, shape, Rgba(*color))
-            X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, instance.yaw[i]), instance.p_WO[i])
-            self._meshcat.SetTransform(path, X_WO)
 
     def _draw_start_line(self) -> None:
         lower, upper = self._scenario.task.start_line.lower, self._scenario.task.start_line.upper

@@ -3,165 +3,155 @@
 import gc
 import math
 import time
+from contextlib import suppress
 from functools import cache
 from importlib.metadata import version
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import QueryObject
-from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 import lic_drake
 from lic_drake.clutter.instance import ClutterInstance
-from lic_drake.reach.diagram import ReachDiagram, make_reach_diagram
+from lic_drake.reach.diagram import make_reach_diagram
 from lic_drake.reach.request import ReachRecord, ReachRequest, is_within_reach
 from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.simulation import Simulation
 from lic_drake.reach.stop_rules import StopMonitor
 from lic_drake.reach.trace import ReachResult, ReachTrace
-from lic_drake.scene.culling import reaches_left_out, select_near, take
+from lic_drake.reach.waking import WakingSimulation
+from lic_drake.scene.sleep import MovedTooFarError, can_sleep
 
 Vector = NDArray[np.float64]
 
 
 class Environment:
-    """One environment of a scenario with its diagram, used for many reaches."""
+    """One environment of a scenario with its diagrams, used for many reaches.
 
-    def __init__(self, scenario: Scenario, instance: ClutterInstance) -> None:
+    Args:
+        scenario: Robot, contact, controller, stop rules.
+        instance: The clutter.
+        sleep: Whether objects may sleep until the arm comes near; without, a reach costs three
+            times as much and ends the same.
+    """
+
+    def __init__(self, scenario: Scenario, instance: ClutterInstance, sleep: bool = True) -> None:
         self.scenario = scenario
         self.instance = instance
         self.arm = scenario.arm()
-        self.keep = select_near(instance, self.arm.reach_m)
-        self._near = make_reach_diagram(scenario, take(instance, self.keep))
-        self._whole: ReachDiagram | None = None
+        self._whole: Simulation | None = None
+        self._waking: WakingSimulation | None = None
+        if sleep and can_sleep(instance):
+            self._waking = WakingSimulation(scenario, instance)
 
-    def reach(self, p_WG: Vector, x0: Vector) -> ReachResult:
+    def reach(self, p_WG: Vector, x0: Vector, keep_states: bool = False) -> ReachResult:
         """Simulates a reach.
 
         Args:
             p_WG: Goal, shape (3,), metres.
             x0: Start pose of the hand.
+            keep_states: Whether the trace is to hold the whole scene.
 
         Returns:
             How it ended. A goal out of the arm's reach is known to fail without simulating it.
         """
         if not is_within_reach(self.scenario, p_WG):
             return ReachResult("unreachable", ReachTrace(), "the goal is beyond the arm's reach")
-        result = self._run(self._near, p_WG, x0)
-        if reaches_left_out(self.instance, self.keep, result.trace.outermost_m):
-            if self._whole is None:
-                self._whole = make_reach_diagram(self.scenario, self.instance)
-            result = self._run(self._whole, p_WG, x0)
-        return result
-
-    def _run(self, reach_diagram: ReachDiagram, p_WG: Vector, x0: Vector) -> ReachResult:
         q0 = self.arm.solve_ik(x0)
         if q0 is None:
             return ReachResult(
                 "invalid_start", ReachTrace(), "no configuration within the joint limits"
             )
-        return simulate(reach_diagram, self.scenario, q0, p_WG)
+        if self._waking is not None:
+            # Where something moved too far at once, the reach is repeated with all objects awake.
+            with suppress(MovedTooFarError):
+                return simulate(self._waking, self.scenario, q0, p_WG, keep_states)
+        if self._whole is None:
+            diagram = make_reach_diagram(self.scenario, self.instance)
+            self._whole = Simulation(diagram, self.scenario.scene)
+        return simulate(self._whole, self.scenario, q0, p_WG, keep_states)
 
 
 def simulate(
-    reach_diagram: ReachDiagram,
+    simulation: Simulation | WakingSimulation,
     scenario: Scenario,
     q0: Vector,
     p_WG: Vector,
-    begin_s: float = 0.0,
+    keep_states: bool = False,
 ) -> ReachResult:
-    """Runs a diagram from rest at q0 until a stop rule ends the reach.
+    """Runs a simulation from rest at q0 until a stop rule ends the reach.
 
     Args:
-        reach_diagram: The environment's diagram.
+        simulation: The environment.
         scenario: Gives the control period and the stop rules.
         q0: First joint angles, shape (m,), radians.
         p_WG: Goal, shape (3,), metres.
-        begin_s: Time on the diagram's clock at which the reach begins, a whole number of seconds;
-            the trace's times count from there. Recordings put one reach after another with it.
+        keep_states: Whether the trace is to hold the whole scene.
+
+    Raises:
+        MovedTooFarError: The simulation must be repeated with every object awake.
     """
-    diagram, scene = reach_diagram.diagram, reach_diagram.scene
     arm = scenario.arm()
     period_s = scenario.mpc.period_s
-    # Drake's own arithmetic for periodic events: no rounding error decides whether a sample comes
-    # before or after the events of its instant.
-    first = round(begin_s / period_s)
-    context = reach_diagram.make_context(q0, p_WG)
-    context.SetTime(first * period_s)
-    query = cast(
-        QueryObject,
-        scene.scene_graph.get_query_output_port().Eval(
-            scene.scene_graph.GetMyContextFromRoot(context)
-        ),
-    )
-    if query.HasCollisions():
+    simulation.begin(q0, p_WG)
+    if simulation.is_in_collision():
         return ReachResult(
             "invalid_start", ReachTrace(), "the arm touches the clutter at its start"
         )
-
-    arm_state = diagram.GetOutputPort("arm_state")
-    clutter_state = diagram.GetOutputPort("clutter_state")
-    taxel_force = diagram.GetOutputPort("taxel_force")
-    num_movable = scene.plant.num_positions(scene.clutter) // 2
     monitor = StopMonitor(scenario.stop, p_WG, period_s)
     trace = ReachTrace()
-    simulator = Simulator(diagram, context)
-    if scenario.scene.time_step_s == 0.0:
-        simulator_config = SimulatorConfig(
-            integration_scheme="cenic",
-            accuracy=scenario.scene.cenic_accuracy,
-            max_step_size=scenario.scene.cenic_max_step_s,
-            start_time=first * period_s,
-        )
-        ApplySimulatorConfig(simulator_config, simulator)
     step = 0
     while True:
+        # Drake's own arithmetic for periodic events: no rounding error decides whether a sample
+        # comes before or after the events of its instant.
+        time_s = step * period_s
         try:
-            if step == 0:
-                simulator.Initialize()
-            simulator.AdvanceTo((first + step) * period_s)
-            q = np.array(arm_state.Eval(context))[: len(q0)]
+            simulation.advance_to(time_s)
+            q = simulation.joint_angles()
             # Reading the taxels solves the contacts of this instant, which can fail, too.
-            forces = np.asarray(taxel_force.Eval(context))
+            forces = simulation.taxel_force()
         except (ArithmeticError, RuntimeError, ValueError) as error:
             return ReachResult("diverged", trace, " ".join(str(error).split())[:200])
-        if not np.all(np.isfinite(q)):
+        if not all(map(math.isfinite, q)):
             return ReachResult("diverged", trace, "joint angles are not finite")
         p_WE = arm.tip_position(q)
-        time_s = step * period_s
         trace.append(time_s, q, p_WE, forces)
-        if num_movable:
-            trace.follow(np.asarray(clutter_state.Eval(context))[: 2 * num_movable])
+        if keep_states:
+            trace.states.append(simulation.state())
         outcome = monitor.update(time_s, p_WE, trace.peak_force[-1])
         if outcome is not None:
             return ReachResult(outcome, trace)
+        simulation.look_around(q)
         step += 1
 
 
-_recent: dict[tuple[str, str, int], Environment] = {}
+_recent: dict[tuple[str, str, int, bool], Environment] = {}
 
 
-def environment_of(request: ReachRequest) -> Environment:
+def environment_of(request: ReachRequest, sleep: bool = True) -> Environment:
     """Returns the environment of a request; the last one used in this process is kept."""
-    key = (request.scenario.digest, request.stream, request.environment)
+    key = (request.scenario.digest, request.stream, request.environment, sleep)
     if key not in _recent:
         _recent.clear()
         # Diagrams with Python systems are reference cycles: only the collector frees them.
         gc.collect()
         scenario = request.scenario
         instance = scenario.sample_instance(request.stream, request.environment)
-        _recent[key] = Environment(scenario, instance)
+        _recent[key] = Environment(scenario, instance, sleep)
     return _recent[key]
 
 
-def run_reach(request: ReachRequest) -> ReachRecord:
+def run_reach(request: ReachRequest, sleep: bool = True) -> ReachRecord:
     """Simulates a request; its record depends on nothing else.
 
     Physical failures are outcomes, not exceptions: see `lic_drake.reach.request.OUTCOMES`.
+
+    Args:
+        request: The reach.
+        sleep: See `Environment`.
     """
     began = time.perf_counter()
     p_WG, x0 = np.array(request.goal), np.array(request.start)
-    result = environment_of(request).reach(p_WG, x0)
+    result = environment_of(request, sleep).reach(p_WG, x0)
     return make_record(request, result, time.perf_counter() - began)
 
 

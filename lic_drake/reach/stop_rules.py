@@ -1,5 +1,6 @@
 """When a reach ends: at the goal, stuck, by force, or out of time. Pure bookkeeping."""
 
+import math
 from collections import deque
 from dataclasses import dataclass
 
@@ -63,7 +64,7 @@ class StopMonitor:
             peak_force: Largest taxel force of the sample, N.
         """
         self._recent.append(p_WE)
-        distance = float(np.linalg.norm(p_WE - self._p_WG))
+        distance = math.dist(p_WE, self._p_WG)
         self.min_distance = min(self.min_distance, distance)
         if distance < self._config.success_distance_m:
             return "reached"
@@ -72,7 +73,7 @@ class StopMonitor:
         elif time_s - self._low_force_time_s >= self._config.force_time_s - 1e-9:
             return "force"
         if len(self._recent) == self._recent.maxlen:
-            moved = float(np.linalg.norm(self._recent[-1] - self._recent[0]))
+            moved = math.dist(self._recent[-1], self._recent[0])
             if moved < self._config.stuck_distance_m:
                 return "stuck"
         if time_s >= self._config.timeout_s - 1e-9:

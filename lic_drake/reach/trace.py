@@ -8,8 +8,21 @@ from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
 
-MOVED_M = 1e-6
-"""An object displaced by less than this counts as not moved."""
+
+class SceneState(NamedTuple):
+    """Where everything is at one instant, and how fast it moves.
+
+    Attributes:
+        q: Joint angles, shape (m,), radians.
+        v: Joint velocities, shape (m,), rad/s.
+        p_WO: Positions of the movable objects in the plane, shape (n, 2), metres.
+        v_WO: Their velocities, shape (n, 2), m/s.
+    """
+
+    q: Vector
+    v: Vector
+    p_WO: Vector
+    v_WO: Vector
 
 
 @dataclass(kw_only=True)
@@ -23,9 +36,7 @@ class ReachTrace:
         peak_force: Largest taxel force of each sample, N.
         total_force: Sum of the taxel forces, N.
         contacts: Number of loaded taxels.
-        p_WO_start: First positions of the movable objects, shape (n, 2), metres.
-        outermost_m: Largest distance from the base that the centre of a movable object had after
-            it was moved, metres; 0 if none was.
+        states: The state of the scene at each sample, if it was asked for.
     """
 
     time_s: list[float] = field(default_factory=list)
@@ -34,18 +45,7 @@ class ReachTrace:
     peak_force: list[float] = field(default_factory=list)
     total_force: list[float] = field(default_factory=list)
     contacts: list[int] = field(default_factory=list)
-    p_WO_start: Vector | None = None
-    outermost_m: float = 0.0
-
-    def follow(self, positions: Vector) -> None:
-        """Takes the movable objects' positions (x, y, x, y, ..), metres."""
-        p_WO = positions.reshape(-1, 2)
-        if self.p_WO_start is None:
-            self.p_WO_start = p_WO.copy()
-        moved = np.any(np.abs(p_WO - self.p_WO_start) > MOVED_M, axis=1)
-        if np.any(moved):
-            farthest = float(np.sqrt(np.max(np.sum(p_WO[moved] ** 2, axis=1))))
-            self.outermost_m = max(self.outermost_m, farthest)
+    states: list[SceneState] = field(default_factory=list)
 
     def append(self, time_s: float, q: Vector, p_WE: Vector, taxel_force: Vector) -> None:
         """Adds a sample; `taxel_force` has shape (num_taxels,), N."""

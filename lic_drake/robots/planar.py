@@ -1,6 +1,8 @@
 """The three-link planar arm of the 2-D testbed (paper V-A), read from models/planar_arm.urdf."""
 
-from functools import cache
+import math
+from functools import cache, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,18 @@ from lic_drake.robots.arm import SkinCapsule, Vector
 from lic_drake.robots.planar_kinematics import PlanarArmKinematics
 
 LINK_NAMES = ("link1", "link2", "link3")
+
+_MOVES = np.tri(3)
+"""1 where a joint (column) moves a link (row)."""
+
+
+class _Pose(NamedTuple):
+    """Where the arm is at one configuration; see the methods of `PlanarArm` for the fields."""
+
+    R_RL: Vector
+    p_RL: Vector
+    p_RE: Vector
+    Jv_E: Vector
 
 
 class PlanarArm:
@@ -50,6 +64,9 @@ class PlanarArm:
         self.stiffness = np.array([gain.p for gain in gains])
         self.damping = np.array([gain.d for gain in gains])
         self.skin = tuple(_read_skin(plant, scene_graph, name) for name in LINK_NAMES)
+        self._lengths = tuple(self.kinematics.link_lengths.tolist())
+        # Sensor, controller and stop rules ask for the same configuration, one after the other.
+        self._pose = lru_cache(maxsize=1)(self._calc_pose)
 
     def add_to_plant(self, plant: MultibodyPlant) -> ModelInstanceIndex:
         """Adds the arm, welded to the world at the origin, without gravity."""
@@ -68,31 +85,51 @@ class PlanarArm:
 
     def tip_position(self, q: Vector) -> Vector:
         """Returns p_RE, shape (3,), metres."""
-        return np.append(self.kinematics.link_origins(q)[-1], 0.0)
+        return self._pose(*q.tolist()).p_RE
 
     def tip_jacobian(self, q: Vector) -> Vector:
         """Returns Jv_v_RE, shape (3, 3), m/rad; the z row is zero."""
-        return np.vstack([self.kinematics.tip_pose_jacobian(q)[:2], np.zeros(3)])
+        return self._pose(*q.tolist()).Jv_E
 
     def link_poses(self, q: Vector) -> tuple[Vector, Vector]:
         """Returns R_RL, shape (3, 3, 3), and p_RL, shape (3, 3), metres."""
-        angles = np.cumsum(q)
-        cos, sin = np.cos(angles), np.sin(angles)
-        R_RL = np.zeros((3, 3, 3))
-        R_RL[:, 0, 0], R_RL[:, 0, 1] = cos, -sin
-        R_RL[:, 1, 0], R_RL[:, 1, 1] = sin, cos
-        R_RL[:, 2, 2] = 1.0
-        origins = self.kinematics.link_origins(q)[:3]
-        return R_RL, np.column_stack([origins, np.zeros(3)])
+        pose = self._pose(*q.tolist())
+        return pose.R_RL, pose.p_RL
 
     def point_jacobians(self, q: Vector, links: NDArray[np.intp], p_RQ: Vector) -> Vector:
         """Returns Jv_v_RQ of points on links, shape (n, 3, 3), m/rad."""
-        p_JQ = p_RQ[:, None, :2] - self.kinematics.link_origins(q)[None, :3]
-        moves = np.arange(3)[None, :] <= links[:, None]
+        p_JQ = p_RQ[:, None] - self._pose(*q.tolist()).p_RL
         jacobians = np.zeros((len(links), 3, 3))
-        jacobians[:, 0] = np.where(moves, -p_JQ[:, :, 1], 0.0)
-        jacobians[:, 1] = np.where(moves, p_JQ[:, :, 0], 0.0)
+        jacobians[:, 0] = -p_JQ[:, :, 1]
+        jacobians[:, 1] = p_JQ[:, :, 0]
+        jacobians *= _MOVES[links][:, None]
         return jacobians
+
+    def _calc_pose(self, q1: float, q2: float, q3: float) -> _Pose:
+        """Returns the arm's pose; its arrays are shared by all who ask, and so read-only."""
+        l1, l2, l3 = self._lengths
+        c1, s1 = math.cos(q1), math.sin(q1)
+        c2, s2 = math.cos(q1 + q2), math.sin(q1 + q2)
+        c3, s3 = math.cos(q1 + q2 + q3), math.sin(q1 + q2 + q3)
+        # Second joint, third joint, tip: at q = 0 the links point along -y.
+        x2, y2 = l1 * s1, -l1 * c1
+        x3, y3 = x2 + l2 * s2, y2 - l2 * c2
+        xE, yE = x3 + l3 * s3, y3 - l3 * c3
+        pose = _Pose(
+            R_RL=np.array(
+                [
+                    [[c1, -s1, 0.0], [s1, c1, 0.0], [0.0, 0.0, 1.0]],
+                    [[c2, -s2, 0.0], [s2, c2, 0.0], [0.0, 0.0, 1.0]],
+                    [[c3, -s3, 0.0], [s3, c3, 0.0], [0.0, 0.0, 1.0]],
+                ]
+            ),
+            p_RL=np.array([[0.0, 0.0, 0.0], [x2, y2, 0.0], [x3, y3, 0.0]]),
+            p_RE=np.array([xE, yE, 0.0]),
+            Jv_E=np.array([[-yE, y2 - yE, y3 - yE], [xE, xE - x2, xE - x3], [0.0, 0.0, 0.0]]),
+        )
+        for item in pose:
+            item.flags.writeable = False
+        return pose
 
 
 def _read_skin(plant: MultibodyPlant, scene_graph: SceneGraph, link: str) -> SkinCapsule:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
+from reaches import start_context
 from worlds import ARM, LAYOUT, cylinder, make_clutter
 
 from lic_drake.clutter.instance import ClutterInstance
@@ -36,7 +37,7 @@ def run(
 ) -> Run:
     scenario = parse_scenario(SCENARIO, overrides)
     reach = make_reach_diagram(scenario, clutter)
-    context = reach.make_context(q, p_WG)
+    context = start_context(reach, q, p_WG)
     simulator = Simulator(reach.diagram, context)
     samples = []
     for i in range(round(time * scenario.mpc.rate_hz) + 1):

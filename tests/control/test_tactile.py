@@ -25,9 +25,16 @@ def turn(link: int, v_L: np.ndarray) -> np.ndarray:
     return v_L @ POSES[0][link].T
 
 
+def make_patch(link: int, p_RQ: np.ndarray, f_R: np.ndarray) -> ContactPatch:
+    """A patch from the forces of the link on the object at its faces."""
+    force = np.linalg.norm(f_R, axis=1)
+    n_R = f_R / np.where(force > 0.0, force, 1.0)[:, None]
+    return ContactPatch(link=link, p_RQ=p_RQ, n_R=n_R, force=force)
+
+
 def press(link: int, p_L: np.ndarray, f_L: np.ndarray) -> np.ndarray:
     """Taxel forces of one patch whose faces are given in the link's frame."""
-    patch = ContactPatch(link=link, p_RQ=place(link, p_L), f_R=turn(link, f_L))
+    patch = make_patch(link, place(link, p_L), turn(link, f_L))
     return calc_taxel_forces(LAYOUT, *POSES, [patch])
 
 
@@ -146,10 +153,10 @@ def test_an_edge_that_presses_with_both_its_sides_reads_as_one_contact() -> None
 @given(st.lists(st.tuples(LINK, st.floats(-0.15, -0.05), st.floats(0.1, 10.0)), max_size=6))
 def test_contacts_add_up_taxel_by_taxel(contacts: list[tuple[int, float, float]]) -> None:
     patches = [
-        ContactPatch(
-            link=link,
-            p_RQ=place(link, np.array([[0.015, along, 0.0]])),
-            f_R=turn(link, np.array([[force, 0.0, 0.0]])),
+        make_patch(
+            link,
+            place(link, np.array([[0.015, along, 0.0]])),
+            turn(link, np.array([[force, 0.0, 0.0]])),
         )
         for link, along, force in contacts
     ]
@@ -164,11 +171,18 @@ def test_a_patch_without_pressure_reads_nothing() -> None:
     np.testing.assert_array_equal(forces, 0.0)
 
 
+@pytest.mark.filterwarnings("error")
+def test_faces_whose_forces_cancel_read_nothing() -> None:
+    f_L = np.array([[2.0, 0.0, 0.0], [-2.0, 0.0, 0.0]])
+    forces = press(2, np.array([[0.015, -0.1, 0.0]] * 2), f_L)
+    np.testing.assert_allclose(forces, 0.0, atol=1e-12)
+
+
 @given(ANGLE, ANGLE, ANGLE)
 def test_readings_do_not_depend_on_the_configuration(q1: float, q2: float, q3: float) -> None:
     R_RL, p_RL = ARM.link_poses(np.array([q1, q2, q3]))
     p_L, f_L = np.array([0.015, -0.1234, 0.0]), np.array([2.0, 0.5, 0.0])
-    patch = ContactPatch(link=1, p_RQ=(p_RL[1] + R_RL[1] @ p_L)[None], f_R=(R_RL[1] @ f_L)[None])
+    patch = make_patch(1, (p_RL[1] + R_RL[1] @ p_L)[None], (R_RL[1] @ f_L)[None])
     np.testing.assert_allclose(
         calc_taxel_forces(LAYOUT, R_RL, p_RL, [patch]), press(1, p_L[None], f_L[None]), atol=1e-9
     )

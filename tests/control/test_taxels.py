@@ -85,3 +85,19 @@ def test_links_keep_the_order_of_the_skin() -> None:
     skin = (capsule(0.01, 0.1, 0.0, (0.0, 0.0)), capsule(0.01, 0.2, 1.0, (0.0, 0.0)))
     layout = planar_taxels(skin, 100.0)
     np.testing.assert_array_equal(layout.link, [0] * 30 + [1] * 50)
+
+
+@given(st.integers(0, 2), st.tuples(st.floats(-0.05, 0.05), st.floats(-0.4, 0.1)))
+def test_the_taxels_of_a_link_rank_by_their_distance_from_a_point(
+    link: int, point: tuple[float, float]
+) -> None:
+    p_LQ = np.append(point, 0.0)
+    mine = LAYOUT.of_link[link]
+    np.testing.assert_array_equal(mine.taxels, np.flatnonzero(LAYOUT.link == link))
+    distance = np.linalg.norm(LAYOUT.p_LT[LAYOUT.link == link] - p_LQ, axis=1)
+    compared = mine.compare_distances(p_LQ)
+    np.testing.assert_allclose(
+        compared - compared.min(), 0.5 * (distance**2 - distance.min() ** 2), atol=1e-15
+    )
+    both = mine.compare_distances(np.array([np.zeros(3), p_LQ]))
+    np.testing.assert_allclose(both[1], compared, atol=1e-15)

@@ -3,7 +3,7 @@ import pytest
 from pydrake.geometry import Meshcat
 from pydrake.multibody.tree import JointIndex
 from pydrake.systems.analysis import Simulator
-from reaches import start_angles
+from reaches import start_angles, start_context
 from worlds import box, cylinder, make_clutter
 
 from lic_drake.control.taxels import planar_taxels
@@ -68,7 +68,7 @@ def test_every_system_has_a_name_of_its_own(reach_diagram: ReachDiagram) -> None
 
 def test_all_systems_run(reach_diagram: ReachDiagram) -> None:
     # An input that was left unconnected would raise in the first steps.
-    context = reach_diagram.make_context(start_angles(SCENARIO), P_WG)
+    context = start_context(reach_diagram, start_angles(SCENARIO), P_WG)
     Simulator(reach_diagram.diagram, context).AdvanceTo(0.1)
     for port in ("arm_state", "clutter_state", "taxel_force", "desired_state"):
         assert np.all(np.isfinite(reach_diagram.diagram.GetOutputPort(port).Eval(context)))
@@ -76,7 +76,7 @@ def test_all_systems_run(reach_diagram: ReachDiagram) -> None:
 
 def test_the_arm_rests_at_the_start_and_wants_to_stay_there(reach_diagram: ReachDiagram) -> None:
     q0 = start_angles(SCENARIO)
-    context = reach_diagram.make_context(q0, P_WG)
+    context = start_context(reach_diagram, q0, P_WG)
     at_rest = np.append(q0, np.zeros(3))
     for port in ("arm_state", "desired_state"):
         np.testing.assert_array_equal(
@@ -92,8 +92,8 @@ def test_the_arm_rests_at_the_start_and_wants_to_stay_there(reach_diagram: Reach
 
 def test_contexts_share_nothing(reach_diagram: ReachDiagram) -> None:
     q0 = start_angles(SCENARIO)
-    first = reach_diagram.make_context(q0, P_WG)
-    reach_diagram.make_context(q0 + 0.1, P_WG + 0.1)
+    first = start_context(reach_diagram, q0, P_WG)
+    start_context(reach_diagram, q0 + 0.1, P_WG + 0.1)
     state = reach_diagram.diagram.GetOutputPort("arm_state").Eval(first)
     np.testing.assert_array_equal(state[:3], q0)
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from fake_reach import comparable
 from reaches import (
-    MEASURED,
     assert_never_began,
     free_space,
     reach_request,
@@ -18,9 +17,8 @@ from worlds import box, cylinder, make_clutter
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.reach import rollout as dut
-from lic_drake.reach.diagram import make_reach_diagram
 from lic_drake.reach.request import ReachRecord, ReachRequest
-from lic_drake.reach.rollout import Environment, make_record, run_reach, simulate
+from lic_drake.reach.rollout import Environment, make_record, run_reach
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.trace import ReachResult, ReachTrace
 
@@ -230,99 +228,12 @@ def test_another_scenario_or_stream_is_another_environment() -> None:
     assert dut.environment_of(request) is not other
 
 
-# Left-out objects
-
-
-@pytest.mark.parametrize(
-    ("environment", "goal", "y_m", "phi_deg"),
-    [(0, (0.6, 0.1), 0.0, 60.0), (1, (0.75, -0.2), -0.2, 30.0), (2, (0.65, 0.3), 0.3, 90.0)],
-)
-def test_what_is_left_out_makes_no_difference(
-    monkeypatch: pytest.MonkeyPatch,
-    environment: int,
-    goal: tuple[float, float],
-    y_m: float,
-    phi_deg: float,
-) -> None:
-    scenario = load_scenario("cylinder-clutter", "{stop: {timeout_s: 5}}")
-    request = reach_request(scenario, goal, y_m, phi_deg, environment)
-    culled = alone(request)
-    assert not np.all(dut.environment_of(request).keep)
-    monkeypatch.setattr(dut, "select_near", lambda instance, _: np.ones(80, bool))
-    whole = alone(request)
-    assert np.all(dut.environment_of(request).keep)
-    assert (culled.outcome, culled.duration_s) == (whole.outcome, whole.duration_s)
-    assert culled.peak_contacts == whole.peak_contacts
-    for name in MEASURED:
-        # The solver adds in another order, so the last digits differ.
-        assert getattr(culled, name) == pytest.approx(getattr(whole, name), abs=1e-6), name
-
-
-def test_what_only_the_outstretched_arm_touches_is_not_left_out() -> None:
-    environment = Environment(free_space(), make_clutter(cylinder(0.8, 0.0), cylinder(1.0, 0.0)))
-    assert environment.keep.tolist() == [True, False]
-    _, trace, _ = environment.reach(np.array([0.82, 0.0, 0.0]), X0)
-    assert max(trace.contacts) > 0
-
-
-def test_pushing_an_object_outwards_repeats_the_reach_in_the_whole_environment(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    # A box that slides easily, and behind it, too far away to be kept, a post that stops it.
-    scenario = load_scenario(
-        "cylinder-clutter",
-        "{scene: {ground_friction_N: 0.2}, stop: {timeout_s: 11, force_limit_N: 100}}",
-    )
-    sled = box(0.76, 0.0, (0.12, 0.4, 0.2), movable=True)
-    post = cylinder(0.949, 0.0, radius=0.05)
-    p_WG = np.array([0.8, 0.0, 0.0])
-    assert Environment(scenario, make_clutter(sled)).reach(p_WG, X0)[0] == "reached"
-
-    built: list[int] = []
-
-    def make(*args: Any) -> Any:
-        built.append(args[1].num_objects)
-        return make_reach_diagram(*args)
-
-    monkeypatch.setattr(dut, "make_reach_diagram", make)
-    environment = Environment(scenario, make_clutter(sled, post))
-    assert environment.keep.tolist() == [True, False]
-    assert environment.reach(np.array([0.5, 0.1, 0.0]), X0)[0] == "reached"
-    assert built == [1], "a reach that moves nothing needs no more"
-    outcome, trace, _ = environment.reach(p_WG, X0)
-    assert outcome == "timeout"
-    # Sled against post: 0.949 - 0.05 - 0.06.
-    assert trace.outermost_m == pytest.approx(0.839, abs=2e-3)
-    assert built == [1, 2]
-    again, _, _ = environment.reach(p_WG, X0)
-    assert (again, built) == ("timeout", [1, 2]), "the whole environment is built once"
-
-
 # Time
-
-
-@pytest.mark.parametrize("preset", ["haptic_mpc_2013", "ijrr_2013"])
-@pytest.mark.parametrize("begin_s", [3.0, 17.0])
-def test_a_reach_that_begins_later_is_the_same(preset: str, begin_s: float) -> None:
-    scenario = load_scenario(
-        "cylinder-clutter", f"{{mpc: {{preset: {preset}}}, stop: {{timeout_s: 2}}}}"
-    )
-    clutter = make_clutter(cylinder(0.36, -0.05, movable=True), cylinder(0.39, 0.03))
-    diagram = make_reach_diagram(scenario, clutter)
-    q0, p_WG = start_angles(scenario), np.array([0.7, 0.1, 0.0])
-    expected, trace, _ = simulate(diagram, scenario, q0, p_WG)
-    outcome, later, _ = simulate(diagram, scenario, q0, p_WG, begin_s=begin_s)
-    assert max(trace.contacts) > 0
-    assert outcome == expected
-    assert later.time_s == trace.time_s
-    np.testing.assert_allclose(later.q, trace.q, rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(later.peak_force, trace.peak_force, rtol=0.0, atol=1e-9)
 
 
 def test_samples_are_a_control_period_apart_from_zero() -> None:
     scenario = free_space(0.4)
-    diagram = make_reach_diagram(scenario, make_clutter())
-    _, trace, _ = simulate(diagram, scenario, start_angles(scenario), np.array([0.6, 0.1, 0.0]))
+    trace = Environment(scenario, make_clutter()).reach(np.array([0.6, 0.1, 0.0]), X0).trace
     np.testing.assert_allclose(trace.time_s, 0.04 * np.arange(11), atol=1e-12)
     np.testing.assert_array_equal(trace.q[0], start_angles(scenario))
     arm = scenario.arm()
@@ -336,9 +247,7 @@ def test_the_integrators_agree_in_free_space() -> None:
             "cylinder-clutter",
             f"{{scene: {{time_step_s: {time_step_s}}}, stop: {{timeout_s: 2}}}}",
         )
-        diagram = make_reach_diagram(scenario, make_clutter())
-        q0 = start_angles(scenario)
-        _, trace, _ = simulate(diagram, scenario, q0, np.array([0.7, 0.1, 0.0]))
+        trace = Environment(scenario, make_clutter()).reach(np.array([0.7, 0.1, 0.0]), X0).trace
         tips.append(np.array(trace.p_WE))
     assert np.linalg.norm(np.ptp(tips[0], axis=0)) > 0.05
     np.testing.assert_allclose(tips[0], tips[2], atol=5e-4)

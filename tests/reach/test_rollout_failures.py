@@ -12,6 +12,7 @@ from reaches import assert_never_began, free_space, reach_request, small_clutter
 from lic_drake.control import tactile_sensor
 from lic_drake.control.mpc import HapticMpc
 from lic_drake.reach import rollout as dut
+from lic_drake.reach import simulation
 from lic_drake.reach.rollout import run_reach
 
 FREE = free_space()
@@ -37,7 +38,7 @@ class Failing(Simulator):
 def test_a_solver_failure_is_an_outcome_with_what_was_measured_before(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(dut, "Simulator", Failing)
+    monkeypatch.setattr(simulation, "Simulator", Failing)
     record = run_reach(reach_request(FREE))
     assert (record.outcome, record.success) == ("diverged", False)
     assert record.detail == "The solver failed to converge at t = 0.12"
@@ -99,7 +100,7 @@ def test_a_reach_that_fails_before_its_first_sample_has_no_measurements(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(Failing, "AdvanceTo", failing_after(0, print, RuntimeError("x" * 1000)))
-    monkeypatch.setattr(dut, "Simulator", Failing)
+    monkeypatch.setattr(simulation, "Simulator", Failing)
     record = run_reach(reach_request(FREE))
     assert_never_began(record, "diverged")
     assert record.detail == "x" * 200
@@ -109,6 +110,6 @@ def test_the_next_reach_is_not_harmed_by_a_failure(monkeypatch: pytest.MonkeyPat
     request = reach_request(small_clutter(1.0))
     expected = run_reach(request)
     with monkeypatch.context() as patch:
-        patch.setattr(dut, "Simulator", Failing)
+        patch.setattr(simulation, "Simulator", Failing)
         assert run_reach(request).outcome == "diverged"
     assert run_reach(request) == expected

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lic_drake.reach.trace import MOVED_M, ReachTrace
+from lic_drake.reach.trace import ReachTrace
 
 PERIOD_S = 0.04
 
@@ -79,28 +79,3 @@ def test_forces_are_kept_as_peak_sum_and_number_of_loaded_taxels() -> None:
 
 def test_without_contact_the_mean_force_is_zero() -> None:
     assert trace_of(np.zeros((5, 2))).mean_force == 0.0
-
-
-def test_the_outermost_object_is_one_that_was_moved() -> None:
-    trace = ReachTrace()
-    start = np.array([0.5, 0.0, 0.0, 2.0])
-    trace.follow(start)
-    assert trace.outermost_m == 0.0
-    trace.follow(start + [0.1, 0.0, 0.0, 0.0])
-    assert trace.outermost_m == pytest.approx(0.6)
-    # It stays the outermost when it comes back, and less than MOVED_M is no motion.
-    trace.follow(start + [0.05, 0.0, 0.0, 0.9 * MOVED_M])
-    assert trace.outermost_m == pytest.approx(0.6)
-    trace.follow(start + [0.0, 0.0, 0.0, -1.5])
-    assert trace.outermost_m == pytest.approx(0.6)
-    trace.follow(start + [0.0, 0.0, 0.0, 0.5])
-    assert trace.outermost_m == pytest.approx(2.5)
-
-
-def test_the_first_positions_are_a_copy() -> None:
-    trace = ReachTrace()
-    positions = np.array([0.5, 0.0])
-    trace.follow(positions)
-    positions[0] = 0.7
-    trace.follow(positions)
-    assert trace.outermost_m == pytest.approx(0.7)

@@ -130,6 +130,25 @@ def test_the_link_poses_agree_with_drake(angles: tuple[float, ...]) -> None:
         np.testing.assert_allclose(p_RL, X_WL.translation(), atol=1e-12)
 
 
+@given(ANGLES, ANGLES)
+def test_answers_do_not_depend_on_what_was_asked_before(
+    angles: tuple[float, ...], others: tuple[float, ...]
+) -> None:
+    q, other = np.array(angles), np.array(others)
+    questions = (ARM.tip_position, ARM.tip_jacobian, lambda q: ARM.link_poses(q)[0])
+    first = [np.array(question(q)) for question in questions]
+    for question, answer in zip(questions, first, strict=True):
+        question(other)
+        np.testing.assert_array_equal(question(q), answer)
+
+
+def test_shared_answers_cannot_be_written_to() -> None:
+    q = np.array([0.1, 0.2, 0.3])
+    for answer in (ARM.tip_position(q), ARM.tip_jacobian(q), *ARM.link_poses(q)):
+        with pytest.raises(ValueError, match="read-only"):
+            answer[0] = 1.0
+
+
 POINTS = st.lists(
     st.tuples(st.integers(0, 2), st.floats(-0.1, 0.1), st.floats(-0.4, 0.1)), max_size=5
 )

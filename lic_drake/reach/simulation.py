@@ -1,0 +1,161 @@
+"""A reach under way in a diagram: its context, its simulator and what the rollout reads."""
+
+from collections.abc import Iterable
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import CollisionFilterDeclaration, FilterId, GeometrySet, QueryObject
+from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
+
+from lic_drake.reach.diagram import ReachDiagram
+from lic_drake.reach.trace import SceneState
+from lic_drake.scene.scene import SceneConfig
+
+Vector = NDArray[np.float64]
+
+
+ROUNDING = 1e-9
+"""Four steps of exactly 10 ms end 1e-17 s before or after 40 ms; half of the control periods then
+had a fifth step of that length, as dear as the others."""
+
+
+class Simulation:
+    """The arm and the clutter of one diagram, used for one reach after another.
+
+    The context is kept, because making one costs as much as some ten control periods.
+    """
+
+    def __init__(self, reach_diagram: ReachDiagram, config: SceneConfig) -> None:
+        self._reach_diagram = reach_diagram
+        self._config = config
+        scene = reach_diagram.scene
+        self._plant, self._arm, self._clutter = scene.plant, scene.arm, scene.clutter
+        self._context = reach_diagram.diagram.CreateDefaultContext()
+        self._plant_context = scene.plant.GetMyMutableContextFromRoot(self._context)
+        self._p_WO_first = scene.plant.GetPositions(self._plant_context, scene.clutter).reshape(
+            -1, 2
+        )
+        self._taxel_force = reach_diagram.diagram.GetOutputPort("taxel_force")
+        scene_graph = scene.scene_graph
+        self._filters = scene_graph.collision_filter_manager(
+            scene_graph.GetMyMutableContextFromRoot(self._context)
+        )
+        self._hidden: list[FilterId] = []
+
+    @property
+    def num_movable(self) -> int:
+        """Number of movable objects."""
+        return len(self._p_WO_first)
+
+    @property
+    def time_s(self) -> float:
+        """Time on the clock, seconds."""
+        return float(self._context.get_time())
+
+    def begin(self, q: Vector, p_WG: Vector, time_s: float = 0.0) -> None:
+        """Puts the arm at rest at q and every object where the environment has it.
+
+        Args:
+            q: Joint angles, shape (m,), radians.
+            p_WG: Goal, shape (3,), metres.
+            time_s: Time on the clock, seconds.
+        """
+        for hidden in self._hidden:
+            self._filters.RemoveDeclaration(hidden)
+        self._hidden.clear()
+        self._context.SetTime(time_s)
+        self._reach_diagram.set_start(self._context, q, p_WG)
+        p_WO = self._p_WO_first
+        self.set_state(self.state()._replace(p_WO=p_WO, v_WO=np.zeros_like(p_WO)))
+        # A new one, because an integrator's memory would make a reach depend on the one before.
+        self._simulator = Simulator(self._reach_diagram.diagram, self._context)
+        if self._config.time_step_s == 0.0:
+            longest_s = self._config.cenic_max_step_s * (1.0 + ROUNDING)
+            simulator_config = SimulatorConfig(
+                integration_scheme="cenic",
+                accuracy=self._config.cenic_accuracy,
+                max_step_size=longest_s,
+                start_time=time_s,
+            )
+            ApplySimulatorConfig(simulator_config, self._simulator)
+            # Not a tenth of it: nearly all steps are as long as they may be.
+            self._simulator.get_mutable_integrator().request_initial_step_size_target(longest_s)
+        self._initialized = False
+
+    def is_in_collision(self) -> bool:
+        """Tells whether anything touches now."""
+        scene_graph = self._reach_diagram.scene.scene_graph
+        query = scene_graph.get_query_output_port().Eval(
+            scene_graph.GetMyContextFromRoot(self._context)
+        )
+        return bool(cast(QueryObject, query).HasCollisions())
+
+    def advance_to(self, time_s: float) -> None:
+        """Simulates up to a time, not yet with the control update of that instant.
+
+        Raises:
+            RuntimeError: Drake found no solution, or a system failed.
+        """
+        if not self._initialized:
+            self._simulator.Initialize()
+            self._initialized = True
+        self._simulator.AdvanceTo(time_s)
+
+    def joint_angles(self) -> Vector:
+        """Returns the arm's q, shape (m,), radians."""
+        return self._plant.GetPositions(self._plant_context, self._arm)
+
+    def taxel_force(self) -> Vector:
+        """Returns the sensor's reading, shape (num_taxels,), N."""
+        return np.asarray(self._taxel_force.Eval(self._context))
+
+    def object_positions(self) -> Vector:
+        """Returns p_WO of the movable objects in the plane, shape (n, 2), metres."""
+        return self._plant.GetPositions(self._plant_context, self._clutter).reshape(-1, 2)
+
+    def state(self) -> SceneState:
+        """Returns the present state of the arm and of the movable objects."""
+        plant, context = self._plant, self._plant_context
+        return SceneState(
+            q=plant.GetPositions(context, self._arm),
+            v=plant.GetVelocities(context, self._arm),
+            p_WO=plant.GetPositions(context, self._clutter).reshape(-1, 2),
+            v_WO=plant.GetVelocities(context, self._clutter).reshape(-1, 2),
+        )
+
+    def set_state(self, state: SceneState) -> None:
+        """Sets the state of the arm and of all movable objects."""
+        plant, context = self._plant, self._plant_context
+        plant.SetPositions(context, self._arm, state.q)
+        plant.SetVelocities(context, self._arm, state.v)
+        plant.SetPositions(context, self._clutter, state.p_WO.ravel())
+        plant.SetVelocities(context, self._clutter, state.v_WO.ravel())
+
+    def look_around(self, q: Vector) -> None:
+        """Does nothing: every movable object is awake."""
+
+    def publish(self, time_s: float) -> None:
+        """Draws the present state at a time of the recording."""
+        self._context.SetTime(time_s)
+        self._reach_diagram.diagram.ForcedPublish(self._context)
+
+    def take_over_control(self, other: "Simulation") -> None:
+        """Takes over the state of the controller from a simulation of the same arm."""
+        mine, theirs = self._reach_diagram.controller, other._reach_diagram.controller
+        held = theirs.GetMyContextFromRoot(other._context).get_discrete_state()
+        state = mine.GetMyMutableContextFromRoot(self._context).get_mutable_discrete_state()
+        state.SetFrom(held)
+
+    def hide(self, objects: Iterable[int]) -> None:
+        """Lets objects touch nothing any more, until the next reach begins.
+
+        Args:
+            objects: Indices into the objects of the diagram's instance.
+        """
+        scene = self._reach_diagram.scene
+        declaration = CollisionFilterDeclaration().ExcludeBetween(
+            GeometrySet([scene.objects[i] for i in objects]),
+            GeometrySet([*scene.skin_links, *scene.objects]),
+        )
+        self._hidden.append(self._filters.ApplyTransient(declaration))

@@ -1,0 +1,111 @@
+"""A simulation in which movable objects sleep, fixed, until the arm comes near them."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.reach.diagram import make_reach_diagram
+from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.simulation import Simulation
+from lic_drake.reach.trace import SceneState
+from lic_drake.scene.sleep import SkinAxes, SleepMonitor, put_to_sleep
+
+Vector = NDArray[np.float64]
+
+FEWEST_SPARES = 2
+"""Spare objects of the first diagram that has any; every further one has twice as many."""
+
+
+class WakingSimulation:
+    """A `Simulation` of an environment with all its movable objects, most of them asleep.
+
+    An object that wakes up is replaced by a spare, and its fixed copy touches nothing any more.
+    When the spares do not suffice, the reach goes on in a diagram with more of them.
+    """
+
+    def __init__(self, scenario: Scenario, instance: ClutterInstance) -> None:
+        self._scenario = scenario
+        self._instance = instance
+        self._axes = SkinAxes(scenario.arm())
+        self._objects = np.flatnonzero(instance.movable)
+        self._by_spares: dict[int, Simulation] = {}
+
+    def begin(self, q: Vector, p_WG: Vector, time_s: float = 0.0) -> None:
+        """Puts the arm at rest at q and every object where the environment has it.
+
+        Args:
+            q: Joint angles, shape (m,), radians.
+            p_WG: Goal, shape (3,), metres.
+            time_s: Time on the clock, seconds.
+        """
+        self._p_WG = p_WG
+        self._awake: list[int] = []  # In the order of the spares that stand for them.
+        self._monitor = SleepMonitor(self._instance, self._axes, q)
+        self._now = self._with_spares(0)
+        self._now.begin(q, p_WG, time_s)
+        self.look_around(q)
+
+    def is_in_collision(self) -> bool:
+        """Tells whether anything touches now."""
+        return self._now.is_in_collision()
+
+    def advance_to(self, time_s: float) -> None:
+        """Simulates up to a time; see `Simulation.advance_to`."""
+        self._now.advance_to(time_s)
+
+    def joint_angles(self) -> Vector:
+        """Returns the arm's q, shape (m,), radians."""
+        return self._now.joint_angles()
+
+    def taxel_force(self) -> Vector:
+        """Returns the sensor's reading, shape (num_taxels,), N."""
+        return self._now.taxel_force()
+
+    def state(self) -> SceneState:
+        """Returns the present state of the arm and of all movable objects."""
+        now, n = self._now.state(), len(self._awake)
+        p_WO, v_WO = self._monitor.p_WO.copy(), np.zeros_like(self._monitor.p_WO)
+        p_WO[self._awake], v_WO[self._awake] = now.p_WO[:n], now.v_WO[:n]
+        return SceneState(q=now.q, v=now.v, p_WO=p_WO, v_WO=v_WO)
+
+    def look_around(self, q: Vector) -> None:
+        """Wakes what has to be awake before the simulation goes on.
+
+        Args:
+            q: The present joint angles, shape (m,), radians.
+
+        Raises:
+            MovedTooFarError: An object may have been touched while it was asleep.
+        """
+        woken = self._monitor.look(q, self._now.object_positions()[: len(self._awake)])
+        if woken:
+            self._wake(woken)
+
+    def _wake(self, woken: list[int]) -> None:
+        """Lets spares take the places of objects."""
+        before, state = self._now, self.state()
+        self._awake += woken
+        n = len(self._awake)
+        if n > before.num_movable:
+            self._now = self._with_spares(_enough_spares(n, len(self._objects)))
+            self._now.begin(state.q, self._p_WG, before.time_s)
+            self._now.take_over_control(before)
+            woken = self._awake
+        spares = self._now.state()
+        p_WO, v_WO = spares.p_WO.copy(), spares.v_WO.copy()
+        p_WO[:n], v_WO[:n] = state.p_WO[self._awake], state.v_WO[self._awake]
+        self._now.set_state(SceneState(q=state.q, v=state.v, p_WO=p_WO, v_WO=v_WO))
+        self._now.hide(self._objects[woken])
+
+    def _with_spares(self, spares: int) -> Simulation:
+        if spares not in self._by_spares:
+            diagram = make_reach_diagram(self._scenario, put_to_sleep(self._instance, spares))
+            self._by_spares[spares] = Simulation(diagram, self._scenario.scene)
+        return self._by_spares[spares]
+
+
+def _enough_spares(awake: int, num_movable: int) -> int:
+    spares = FEWEST_SPARES
+    while spares < awake:
+        spares *= 2
+    return min(spares, num_movable)

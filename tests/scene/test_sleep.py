@@ -1,0 +1,159 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from worlds import ARM, box, cylinder, make_clutter, make_world
+
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.reach.scenario import load_scenario
+from lic_drake.scene.scene import SceneConfig
+from lic_drake.scene.sleep import (
+    MAX_MOVE_M,
+    PARKING_M,
+    WAKE_M,
+    MovedTooFarError,
+    SkinAxes,
+    SleepMonitor,
+    can_sleep,
+    put_to_sleep,
+)
+
+AXES = SkinAxes(ARM)
+RADIUS = 0.01
+Q = np.array([0.3, 1.0, 0.5])
+CROWD = load_scenario("cylinder-clutter").sample_instance("calibration", 3)
+
+ANGLES = st.tuples(*(st.floats(lo, hi) for lo, hi in zip(ARM.q_min, ARM.q_max, strict=True)))
+PLACE = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
+
+
+@settings(deadline=None, max_examples=60)
+@given(ANGLES, PLACE)
+def test_gaps_are_the_distances_that_drake_finds(
+    angles: tuple[float, ...], place: tuple[float, float]
+) -> None:
+    q = np.array(angles)
+    world = make_world(q, make_clutter(cylinder(*place)), SceneConfig())
+    scene_graph = world.scene.scene_graph
+    query = scene_graph.get_query_output_port().Eval(
+        scene_graph.GetMyContextFromRoot(world.context)
+    )
+    (post,) = world.scene.objects
+    expected = min(
+        query.ComputeSignedDistancePairClosestPoints(skin, post).distance
+        for skin in world.scene.skin_links
+    )
+    (gap,) = AXES.gaps(AXES.ends(q), np.array([place])) - RADIUS
+    if expected > 0.0:
+        assert gap == pytest.approx(expected, abs=1e-4)
+    else:
+        assert gap < 1e-4
+
+
+def gaps_now(q: np.ndarray, p_WO: np.ndarray) -> np.ndarray:
+    return AXES.gaps(AXES.ends(q), p_WO) - RADIUS
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.lists(st.tuples(*[st.floats(-0.005, 0.005)] * 3), min_size=1, max_size=60), st.data())
+def test_whatever_sleeps_is_far_from_the_arm_and_from_pushed_objects(
+    moves: list[tuple[float, float, float]], data: st.DataObject
+) -> None:
+    first = CROWD.p_WO[CROWD.movable, :2]
+    monitor = SleepMonitor(CROWD, AXES, Q)
+    q, awake = Q.copy(), list[int]()
+    positions = first.copy()
+    for move in [(0.0, 0.0, 0.0), *moves]:
+        q = np.clip(q + move, ARM.q_min, ARM.q_max)
+        if awake and data.draw(st.booleans()):
+            pushed = data.draw(st.sampled_from(awake))
+            positions[pushed] += data.draw(st.tuples(*[st.floats(-0.01, 0.01)] * 2))
+        woken = monitor.look(q, positions[awake])
+        assert woken == sorted(set(woken) - set(awake))
+        awake += woken
+        asleep = np.setdiff1d(np.arange(len(first)), awake)
+        assert np.all(gaps_now(q, first[asleep]) >= WAKE_M - 1e-9)
+        # Those that have just woken have not been pushed yet.
+        was_pushed = [i for i in awake if np.abs(positions[i] - first[i]).max() > 1e-6]
+        for i in was_pushed:
+            between = np.linalg.norm(first[asleep] - positions[i], axis=1) - 2.0 * RADIUS
+            assert np.all(between >= WAKE_M - 1e-9)
+        np.testing.assert_array_equal(monitor.p_WO, positions)
+
+
+def test_nobody_wakes_up_without_reason() -> None:
+    monitor = SleepMonitor(CROWD, AXES, Q)
+    near = gaps_now(Q, CROWD.p_WO[CROWD.movable, :2]) < WAKE_M
+    woken = monitor.look(Q, np.zeros((0, 2)))
+    assert woken == np.flatnonzero(near).tolist()
+    first = CROWD.p_WO[CROWD.movable, :2]
+    assert monitor.look(Q, first[woken]) == []
+
+
+@pytest.mark.parametrize("too_far", [False, True])
+def test_a_move_that_is_too_long_to_wake_up_in_time_is_told(too_far: bool) -> None:
+    distance = np.linalg.norm(ARM.tip_position(Q)[:2])
+    angle = (1.2 if too_far else 0.6) * MAX_MOVE_M / distance
+    monitor = SleepMonitor(CROWD, AXES, Q)
+    woken = monitor.look(Q, np.zeros((0, 2)))
+    positions = CROWD.p_WO[CROWD.movable, :2][woken]
+    if too_far:
+        with pytest.raises(MovedTooFarError, match="in a control period"):
+            monitor.look(Q + [angle, 0.0, 0.0], positions)
+    else:
+        monitor.look(Q + [angle, 0.0, 0.0], positions)
+
+
+def test_a_pushed_object_that_moves_too_far_is_told() -> None:
+    tip = ARM.tip_position(Q)
+    monitor = SleepMonitor(make_clutter(cylinder(tip[0], tip[1] + 0.02, movable=True)), AXES, Q)
+    assert monitor.look(Q, np.zeros((0, 2))) == [0]
+    p_WO = tip[None, :2] + [0.0, 0.02]
+    monitor.look(Q, p_WO + [0.5 * MAX_MOVE_M, 0.0])
+    with pytest.raises(MovedTooFarError):
+        monitor.look(Q, p_WO + [1.6 * MAX_MOVE_M, 0.0])
+
+
+def test_everything_is_fixed_and_spares_are_parked() -> None:
+    asleep = put_to_sleep(CROWD, 3)
+    n = CROWD.num_objects
+    assert asleep.num_objects == n + 3
+    assert asleep.movable.tolist() == [False] * n + [True] * 3
+    np.testing.assert_array_equal(asleep.p_WO[:n], CROWD.p_WO)
+    assert asleep.p_WO[n:, :2].min() >= PARKING_M
+    apart = asleep.p_WO[n:, None, 0] - asleep.p_WO[None, n:, 0]
+    assert np.abs(apart[~np.eye(3, dtype=bool)]).min() > 10 * RADIUS
+    like = int(np.argmax(CROWD.movable))
+    for name in ("size", "mass", "yaw"):
+        values = getattr(asleep, name)
+        np.testing.assert_array_equal(values[n:], [getattr(CROWD, name)[like]] * 3)
+        np.testing.assert_array_equal(values[:n], getattr(CROWD, name))
+    assert asleep.shape == (*CROWD.shape, *("cylinder",) * 3)
+
+
+@pytest.mark.parametrize(
+    ("instance", "expected"),
+    [
+        (CROWD, True),
+        (make_clutter(cylinder(0.5, 0.0, movable=True), box(0.7, 0.0, (0.1, 0.1, 0.1))), True),
+        (make_clutter(cylinder(0.5, 0.0), box(0.7, 0.0, (0.1, 0.1, 0.1))), False),
+        (make_clutter(box(0.7, 0.0, (0.1, 0.1, 0.1), movable=True)), False),
+        (
+            make_clutter(
+                cylinder(0.5, 0.0, movable=True), cylinder(0.7, 0.0, movable=True, radius=0.02)
+            ),
+            False,
+        ),
+        (
+            make_clutter(
+                cylinder(0.5, 0.0, movable=True), cylinder(0.7, 0.0, movable=True, mass=2.0)
+            ),
+            False,
+        ),
+        (replace(CROWD, movable=np.zeros_like(CROWD.movable)), False),
+    ],
+)
+def test_only_objects_of_one_kind_can_sleep(instance: ClutterInstance, expected: bool) -> None:
+    assert can_sleep(instance) == expected
