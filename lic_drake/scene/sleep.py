@@ -114,7 +114,7 @@ class SleepMonitor:
         self._ends = axes.ends(q)
         self._p_WO_first = instance.p_WO[instance.movable, :2]
         self._radius = float(instance.size[instance.movable, 0].max(initial=0.0))
-        self._asleep = np.arange(len(self._p_WO_first))
+        self._is_awake = np.zeros(len(self._p_WO_first), dtype=bool)
         self._slack = 0.0
         self.p_WO = self._p_WO_first.copy()
         self._awake: list[int] = []
@@ -141,21 +141,29 @@ class SleepMonitor:
             raise MovedTooFarError(f"{move:.3f} m in a control period")
         self._ends = ends
         self._slack -= move
-        if self._slack > 0.0 or len(self._asleep) == 0:
+        if self._slack > 0.0:
             return []
         return self._wake_up()
 
     def _wake_up(self) -> list[int]:
-        p_WO, p_WP = self.p_WO[self._asleep], self.p_WO[self._awake]
-        gaps = np.empty((len(self._asleep), 1 + len(p_WP)))
-        gaps[:, 0] = self._axes.gaps(self._ends, p_WO) - self._radius
-        gaps[:, 1:] = np.linalg.norm(p_WO[:, np.newaxis] - p_WP, axis=2) - 2.0 * self._radius
-        # An object that is awake but stands where it stood wakes nobody.
-        pushed = np.abs(p_WP - self._p_WO_first[self._awake]).max(axis=1) > MOVED_M
-        asleep = (gaps[:, np.r_[True, pushed]] >= WAKE_M).all(axis=1)
-        awake: list[int] = self._asleep[~asleep].tolist()
-        self._awake += awake
-        self._asleep = self._asleep[asleep]
+        """Wakes the objects that the arm or a pushed object can reach, also through others.
+
+        The gap of an object is that to the arm, or 0 if it was pushed, or the gap of another
+        object plus the one between the two, whichever is the smallest.
+        """
+        gaps = np.maximum(self._axes.gaps(self._ends, self.p_WO) - self._radius, 0.0)
+        gaps[np.abs(self.p_WO - self._p_WO_first).max(axis=1) > MOVED_M] = 0.0
+        while True:
+            passing = self._is_awake | (gaps < WAKE_M)
+            d = self.p_WO[:, np.newaxis] - self.p_WO[passing]
+            between = np.maximum(np.sqrt((d * d).sum(axis=2)) - 2.0 * self._radius, 0.0)
+            chained = np.minimum(gaps, (between + gaps[passing]).min(axis=1, initial=np.inf))
+            if (chained == gaps).all():
+                break
+            gaps = chained
+        woken = np.flatnonzero((gaps < WAKE_M) & ~self._is_awake).tolist()
+        self._awake += woken
+        self._is_awake[woken] = True
         # Until something has moved that far, nobody else has to wake up.
-        self._slack = float(gaps[asleep].min(initial=np.inf)) - WAKE_M
-        return awake
+        self._slack = float(gaps[~self._is_awake].min(initial=np.inf)) - WAKE_M
+        return woken

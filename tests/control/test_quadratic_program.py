@@ -89,7 +89,8 @@ def test_force_terms_a_hundred_thousand_times_stiffer_do_not_spoil_the_solution(
     problem = random_problem(np.random.default_rng(seed), scale=10.0**digits)
     x = solve(problem)
     if x is not None:
-        assert violation(problem, x) < 1e-8
+        # Of rows that are up to 1e5 times as large as in the test before.
+        assert violation(problem, x) < 1e-9 * 10.0**digits
         assert kkt_residual(problem, x) < 1e-5
 
 
