@@ -62,8 +62,8 @@ def chained_gaps(q: np.ndarray, p_WO: np.ndarray, pushed: list[int]) -> np.ndarr
     edges[1:, 1:] = np.linalg.norm(p_WO[:, None] - p_WO, axis=2) - 2.0 * RADIUS
     edges[0, 1:] = AXES.gaps(AXES.ends(q), p_WO) - RADIUS
     edges[0, 1:][pushed] = 0.0
-    # A gap of 0 would mean "no edge" to SciPy.
-    return shortest_path(np.maximum(edges, 1e-12), indices=0)[1:]
+    # A gap of nearly 0 would mean "no edge" to SciPy.
+    return shortest_path(np.maximum(edges, 1e-6), indices=0)[1:]
 
 
 def crowd(seed: int) -> ClutterInstance:
