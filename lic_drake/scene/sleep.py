@@ -115,6 +115,7 @@ class SleepMonitor:
         self._p_WO_first = instance.p_WO[instance.movable, :2]
         self._radius = float(instance.size[instance.movable, 0].max(initial=0.0))
         self._is_awake = np.zeros(len(self._p_WO_first), dtype=bool)
+        self._pushed = np.zeros_like(self._is_awake)
         self._slack = 0.0
         self.p_WO = self._p_WO_first.copy()
         self._awake: list[int] = []
@@ -134,9 +135,13 @@ class SleepMonitor:
         # No point of an axis moves further than the end that moves further.
         move = math.sqrt(((ends - self._ends) ** 2).sum(axis=1).max())
         if self._awake:
-            pushed = p_WO_awake - self.p_WO[self._awake]
-            move = max(move, math.sqrt((pushed * pushed).sum(axis=1).max()))
+            d = p_WO_awake - self.p_WO[self._awake]
+            move = max(move, math.sqrt((d * d).sum(axis=1).max()))
             self.p_WO[self._awake] = p_WO_awake
+            pushed = self._is_pushed()
+            if (pushed != self._pushed).any():
+                # Whoever begins to move was no danger before.
+                self._pushed, self._slack = pushed, 0.0
         if move > MAX_MOVE_M:
             raise MovedTooFarError(f"{move:.3f} m in a control period")
         self._ends = ends
@@ -152,7 +157,7 @@ class SleepMonitor:
         object plus the one between the two, whichever is the smallest.
         """
         gaps = np.maximum(self._axes.gaps(self._ends, self.p_WO) - self._radius, 0.0)
-        gaps[np.abs(self.p_WO - self._p_WO_first).max(axis=1) > MOVED_M] = 0.0
+        gaps[self._pushed] = 0.0
         while True:
             passing = self._is_awake | (gaps < WAKE_M)
             d = self.p_WO[:, np.newaxis] - self.p_WO[passing]
@@ -167,3 +172,7 @@ class SleepMonitor:
         # Until something has moved that far, nobody else has to wake up.
         self._slack = float(gaps[~self._is_awake].min(initial=np.inf)) - WAKE_M
         return woken
+
+    def _is_pushed(self) -> NDArray[np.bool_]:
+        pushed: NDArray[np.bool_] = np.abs(self.p_WO - self._p_WO_first).max(axis=1) > MOVED_M
+        return pushed
