@@ -49,13 +49,17 @@ class TactileSensor(LeafSystem):
         )
 
     def _calc_taxel_force(self, context: Context, output: BasicVector) -> None:
-        results = cast(ContactResults, self._contact_results.Eval(context))
+        results = self._eval_contacts(context)
         patches = read_patches(results, lambda geometry: self._skin_links.get(geometry.get_value()))
         if not patches:
             output.SetFromVector(np.zeros(self._layout.num_taxels))
             return
         q = np.asarray(self._arm_state.Eval(context))[: len(self._arm.q_min)]
         output.SetFromVector(calc_taxel_forces(self._layout, *self._arm.link_poses(q), patches))
+
+    def _eval_contacts(self, context: Context) -> ContactResults:
+        """Lets the plant find and solve the contacts of this instant."""
+        return cast(ContactResults, self._contact_results.Eval(context))
 
 
 def read_patches(

@@ -12,6 +12,7 @@ from lic_drake.control.tactile_sensor import TactileSensor
 from lic_drake.evaluate.batch import random_requests
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.waking import WakingSimulation
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,8 +26,9 @@ class ReachSpeed:
         simulated_s: Simulated time of all of them, seconds.
         wall_per_reach_s: Wall time of a reach, seconds.
         wall_per_sim_s: Wall seconds per simulated second.
-        split: Shares of the wall time of all reaches: physics (Drake's stepping), sensor (tactile
-            sensor), mpc (controller without the sensor), rest (set-up, stop rules, record).
+        split: Shares of the wall time of all reaches: physics (Drake's steps, and the contacts at
+            the control instants), sensor (taxels from contacts), mpc (controller without the
+            sensor), build (diagrams and their contexts), rest (stop rules, waking, records).
     """
 
     robot: str
@@ -42,7 +44,7 @@ class ReachSpeed:
         return asdict(self)
 
 
-class _Stopwatch:
+class Stopwatch:
     """Adds up the time spent in a method, by wrapping it for the length of a with block."""
 
     def __init__(self, owner: type, name: str) -> None:
@@ -50,7 +52,7 @@ class _Stopwatch:
         self._owner, self._name = owner, name
         self._method = getattr(owner, name)
 
-    def __enter__(self) -> "_Stopwatch":
+    def __enter__(self) -> "Stopwatch":
         method = self._method
 
         def timed(*args: Any, **kwargs: Any) -> Any:
@@ -82,9 +84,11 @@ def measure_reaches(scenario: Scenario, reaches: int, per_environment: int = 5) 
     requests = random_requests(scenario, "calibration", environments, per_environment)[:reaches]
     # Diagrams bind the methods when they are built, so the watches go on before the first one.
     with (
-        _Stopwatch(TactileSensor, "_calc_taxel_force") as sensor,
-        _Stopwatch(HapticMpcController, "_update") as controller,
-        _Stopwatch(Simulator, "AdvanceTo") as stepping,
+        Stopwatch(TactileSensor, "_calc_taxel_force") as sensor,
+        Stopwatch(TactileSensor, "_eval_contacts") as contacts,
+        Stopwatch(HapticMpcController, "_update") as controller,
+        Stopwatch(Simulator, "AdvanceTo") as stepping,
+        Stopwatch(WakingSimulation, "_with_spares") as build,
     ):
         began = time.perf_counter()
         records = [run_reach(request) for request in requests]
@@ -92,11 +96,12 @@ def measure_reaches(scenario: Scenario, reaches: int, per_environment: int = 5) 
     moving = [record for record in records if record.duration_s > 0.0]
     # The stop rules ask for the taxel forces first; the controller finds them in Drake's cache.
     seconds = {
-        "physics": stepping.seconds - controller.seconds,
-        "sensor": sensor.seconds,
+        "physics": stepping.seconds - controller.seconds + contacts.seconds,
+        "sensor": sensor.seconds - contacts.seconds,
         "mpc": controller.seconds,
-        "rest": total - stepping.seconds - sensor.seconds,
+        "build": build.seconds,
     }
+    seconds["rest"] = total - sum(seconds.values())
     return ReachSpeed(
         robot=scenario.robot,
         category=scenario.category,

@@ -14,7 +14,7 @@ def test_speed_counts_reaches_and_splits_all_of_their_time() -> None:
     assert speed.reaches <= 3
     assert speed.simulated_s == pytest.approx(0.4 * speed.reaches)
     assert speed.wall_per_sim_s > 0.0
-    assert set(speed.split) == {"physics", "sensor", "mpc", "rest"}
+    assert set(speed.split) == {"physics", "sensor", "mpc", "build", "rest"}
     assert sum(speed.split.values()) == pytest.approx(1.0)
     assert all(share >= 0.0 for share in speed.split.values())
     assert HapticMpcController._update is before

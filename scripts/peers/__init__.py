@@ -1,0 +1,1 @@
+"""The same reaches in other simulators, for `scripts/benchmark_peers.py`."""

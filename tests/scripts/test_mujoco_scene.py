@@ -1,0 +1,171 @@
+"""MuJoCo's scene against Drake's, and against statics and Newton's law."""
+
+import numpy as np
+import pytest
+from worlds import ARM, World, box, cylinder, make_clutter, make_world
+
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.errors import ScenarioError
+from lic_drake.scene.scene import SceneConfig
+
+pytest.importorskip("mujoco")
+
+import mujoco
+from peers.mujoco_scene import MujocoConfig, make_mujoco_scene
+
+BENT = np.deg2rad([-30.0, 60.0, 50.0])
+PARKED = np.deg2rad([-140.0, 100.0, 120.0])
+AXIS_LIMIT = 0.25 * np.pi * 2.0
+"""Dry friction along x or y, N: 2 N in the mean over all directions, in both engines."""
+
+
+class MujocoWorld:
+    """Arm and clutter in MuJoCo with fixed equilibrium angles."""
+
+    def __init__(self, q: np.ndarray, clutter: ClutterInstance, **config: float | bool) -> None:
+        scene = make_mujoco_scene(ARM, clutter, SceneConfig(), MujocoConfig(**config))
+        self.model, self.link_of = scene.model, scene.link_of
+        self.data = mujoco.MjData(self.model)
+        self.data.qpos[:3] = self.data.ctrl[:] = q
+
+    @property
+    def q(self) -> np.ndarray:
+        return self.data.qpos[:3].copy()
+
+    def advance(self, duration_s: float) -> None:
+        steps = round(duration_s / self.model.opt.timestep)
+        mujoco.mj_step(self.model, self.data, steps)
+
+
+@pytest.mark.parametrize("time_step_s", [0.001, 0.005])
+def test_the_free_arm_follows_its_equilibrium_as_in_drake(time_step_s: float) -> None:
+    q_d = BENT + np.array([0.3, -0.2, 0.25])
+    mine = MujocoWorld(BENT, make_clutter(), time_step_s=time_step_s)
+    drake = make_world(BENT, make_clutter(), SceneConfig(time_step_s=0.0005))
+    mine.data.ctrl[:] = q_d
+    drake.set_equilibrium(q_d)
+    for duration_s in (0.1, 0.2, 0.7, 7.0):
+        mine.advance(duration_s)
+        drake.advance(duration_s)
+        # First order in the step, as Drake's own (tests/scene/test_impedance.py).
+        np.testing.assert_allclose(mine.q, drake.q, atol=0.2 * (time_step_s + 0.0005))
+    np.testing.assert_allclose(mine.q, q_d, atol=1e-5)
+
+
+@pytest.mark.parametrize("joint", [0, 1, 2])
+def test_a_joint_stops_at_its_limit(joint: int) -> None:
+    q = np.deg2rad([-50.0, 70.0, 80.0])
+    q[joint] = ARM.q_max[joint] - 0.1
+    world = MujocoWorld(q, make_clutter())
+    world.data.ctrl[joint] = ARM.q_max[joint] + 0.2
+    world.advance(5.0)
+    assert world.q[joint] == pytest.approx(ARM.q_max[joint], abs=2e-3)
+
+
+@pytest.mark.parametrize("time_step_s", [0.001, 0.005])
+@pytest.mark.parametrize("sleep", [True, False])
+@pytest.mark.parametrize("angle_deg", [0.0, 45.0, 90.0])
+def test_dry_friction_holds_below_its_limit_and_yields_above(
+    angle_deg: float, sleep: bool, time_step_s: float
+) -> None:
+    direction = np.array([np.cos(np.deg2rad(angle_deg)), np.sin(np.deg2rad(angle_deg))])
+    limit = AXIS_LIMIT / np.abs(direction).max()
+    clutter = make_clutter(cylinder(0.6, 0.0, movable=True))
+    for force in (0.95 * limit, 1.05 * limit, 5.0):
+        world = MujocoWorld(PARKED, clutter, sleep=sleep, time_step_s=time_step_s)
+        world.data.qfrc_applied[3:] = force * direction
+        world.advance(0.5)
+        speed = float(np.linalg.norm(world.data.qvel[3:]))
+        along = np.abs(force * direction)
+        expected = 0.5 * np.linalg.norm(np.maximum(along - AXIS_LIMIT, 0.0))
+        assert speed == pytest.approx(expected, rel=0.02, abs=1.5e-3)
+
+
+def test_what_nobody_pushes_stays_where_it_is() -> None:
+    clutter = make_clutter(cylinder(0.6, 0.0, movable=True), cylinder(0.7, 0.3, movable=True))
+    world = MujocoWorld(BENT, clutter, sleep=False)
+    world.data.ctrl[:] = BENT + 0.05
+    world.advance(2.0)
+    np.testing.assert_array_equal(world.data.qpos[3:], 0.0)
+
+
+def press(world: World | MujocoWorld, first: np.ndarray, force: float) -> tuple[float, float]:
+    """Presses link 3 on the last cylinder; returns penetration, metres, and force, N, of statics.
+
+    Args:
+        world: A cylinder near link 3, alone or movable in front of a fixed one.
+        first: Where it stands at first, shape (3,), metres.
+        force: How hard to press, N.
+    """
+    R_RL, _ = ARM.link_poses(BENT)
+    J = ARM.point_jacobians(BENT, np.array([2]), first[None])[0]
+    q_d = BENT + J.T @ (force * R_RL[2, :, 0]) / ARM.stiffness
+    centre = first.copy()
+    if isinstance(world, MujocoWorld):
+        world.data.ctrl[:] = q_d
+        world.advance(6.0)
+        if world.model.nv > 3:
+            centre[:2] += world.data.qpos[3:]
+    else:
+        world.set_equilibrium(q_d)
+        world.advance(6.0)
+        if len(world.objects):
+            centre[:2] = world.objects[0]
+    R_RL, p_RL = ARM.link_poses(world.q)
+    normal, p_LC = R_RL[2, :, 0], centre - p_RL[2]
+    J = ARM.point_jacobians(world.q, np.array([2]), (centre - 0.01 * normal)[None])[0]
+    f_C = np.linalg.lstsq(J[:2].T, ARM.stiffness * (q_d - world.q), rcond=None)[0]
+    return 0.025 - float(p_LC @ normal), float(f_C @ normal[:2])
+
+
+@pytest.mark.parametrize("time_step_s", [0.001, 0.005])
+@pytest.mark.parametrize("movable", [False, True])
+def test_a_link_pressed_on_a_cylinder_is_about_as_stiff_as_in_drake(
+    movable: bool, time_step_s: float
+) -> None:
+    R_RL, p_RL = ARM.link_poses(BENT)
+    first = p_RL[2] - 0.2 * R_RL[2, :, 1] + 0.0252 * R_RL[2, :, 0]
+    behind = first + 0.0202 * R_RL[2, :, 0]
+    near = cylinder(*first[:2], movable=movable)
+    clutter = make_clutter(near, cylinder(*behind[:2])) if movable else make_clutter(near)
+    stiffness = []
+    for world in (
+        MujocoWorld(BENT, clutter, time_step_s=time_step_s),
+        make_world(BENT, clutter, SceneConfig(time_step_s=0.005)),
+    ):
+        (shallow, low), (deep, high) = (press(world, first, force) for force in (2.0, 5.0))
+        assert high > low + 2.0
+        stiffness.append((high - low) / (deep - shallow))
+    # Drake's patch stiffens with the force; MuJoCo knows the inertia at the contact roughly.
+    assert stiffness[0] == pytest.approx(stiffness[1], rel=0.25)
+
+
+def test_two_objects_are_as_stiff_as_drakes() -> None:
+    clutter = make_clutter(cylinder(0.6, 0.0), cylinder(0.5795, 0.0, movable=True))
+    world = MujocoWorld(PARKED, clutter)
+    world.data.qfrc_applied[3] = 20.0
+    world.advance(1.0)
+    # 20 N less the ground's friction on a spring of 48 kN/m.
+    assert world.data.qpos[3] - 0.0005 == pytest.approx((20.0 - AXIS_LIMIT) / 4.8e4, rel=0.1)
+
+
+def test_the_arm_slides_on_an_object_with_a_friction_of_0_4() -> None:
+    R_RL, p_RL = ARM.link_poses(BENT)
+    normal, along = R_RL[2, :, 0], -R_RL[2, :, 1]
+    centre = p_RL[2] + 0.2 * along + 0.025 * normal
+    world = MujocoWorld(BENT, make_clutter(cylinder(*centre[:2])))
+    to_joints = np.linalg.pinv(ARM.tip_jacobian(BENT))
+    world.data.ctrl[:] = BENT + to_joints @ (0.03 * normal)
+    world.advance(3.0)
+    world.data.ctrl[:] = BENT + to_joints @ (0.03 * normal + 0.06 * along)
+    world.advance(0.5)
+    wrench = np.zeros(6)
+    mujoco.mj_contactForce(world.model, world.data, 0, wrench)
+    assert wrench[0] > 1.0
+    assert np.linalg.norm(wrench[1:3]) == pytest.approx(0.4 * wrench[0], rel=0.01)
+
+
+def test_only_cylinders_are_taken() -> None:
+    clutter = make_clutter(box(0.6, 0.0, (0.1, 0.1, 0.1)))
+    with pytest.raises(ScenarioError, match="only cylinders can be compared"):
+        MujocoWorld(PARKED, clutter)
