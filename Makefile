@@ -27,7 +27,7 @@ $(STAMP): pyproject.toml
 	@PYTHON=$(PYTHON_IN_VENV) scripts/find_python.sh >/dev/null 2>&1 || { \
 	  python=$$(scripts/find_python.sh) && echo "creating $(VENV) with $$python" && \
 	  "$$python" -m venv --clear $(VENV); }
-	$(PYTHON_IN_VENV) -m pip install --disable-pip-version-check --quiet --editable '.[dev]'
+	$(PYTHON_IN_VENV) -m pip install --disable-pip-version-check --quiet --editable '.[dev,cluster]'
 	@$(PYTHON_IN_VENV) -c 'import pydrake.common' || { \
 	  echo "Drake does not load; on Debian and Ubuntu: apt-get install libglib2.0-0" >&2; exit 1; }
 	@touch $@

@@ -18,3 +18,7 @@ class RequestError(LicError):
 
 class LibraryError(LicError):
     """An experience library cannot be read or written."""
+
+
+class ClusterError(LicError):
+    """A cluster cannot be reached, or its workers cannot be used as they are."""

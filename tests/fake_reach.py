@@ -6,7 +6,7 @@ import os
 import resource
 import signal
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from lic_drake.experience.grid import CollectionRequest
@@ -69,32 +69,42 @@ class FakeReach:
     Attributes:
         log: File that gets a line "key pid" for each finished call.
         sleep_s: Duration of a call, seconds.
-        deadly: Key of the request that kills its process by SIGKILL ...
-        deaths: ... this many times.
+        hold: A call waits as long as this file is there.
+        deadly: Key of the request that ends its process ...
+        deaths: ... this many times ...
+        death: ... by this signal.
         failing_environment: Environment whose reaches raise.
         max_file_bytes: Kernel limit for every file the process writes; 0: none.
+        limit_at: Key of the first request with this limit; the process's first one if empty.
+        fatal_limit: The write that exceeds the limit kills the whole process group: the bytes up
+            to the limit are in the file.
     """
 
     log: Path
     sleep_s: float = 0.0
+    hold: Path = Path("/nowhere")
     deadly: str = ""
     deaths: int = 1
+    death: signal.Signals = signal.SIGKILL
     failing_environment: int = -1
     max_file_bytes: int = 0
+    limit_at: str = ""
+    fatal_limit: bool = False
 
     def __call__(self, request: ReachRequest) -> ReachRecord:
         if request.environment == self.failing_environment:
             raise ArithmeticError("no such\nenvironment")
-        if self.max_file_bytes:
-            hard = resource.getrlimit(resource.RLIMIT_FSIZE)[1]
-            resource.setrlimit(resource.RLIMIT_FSIZE, (self.max_file_bytes, hard))
+        if self.max_file_bytes and self.limit_at in ("", request.key):
+            limit_files(self.max_file_bytes, fatal=self.fatal_limit)
         time.sleep(self.sleep_s)
+        while self.hold.exists():
+            time.sleep(0.02)
         deaths = self.log.with_suffix(".deaths")
         if request.key == self.deadly:
             already = deaths.stat().st_size if deaths.exists() else 0
             if already < self.deaths:
                 _append(deaths, "x")
-                os.kill(os.getpid(), signal.SIGKILL)
+                signal.raise_signal(self.death)  # To this very thread, like os.abort().
         _append(self.log, f"{request.key} {os.getpid()}\n")
         return make_record(request)
 
@@ -108,6 +118,29 @@ class FakeReach:
 
     def _lines(self) -> list[str]:
         return self.log.read_text().splitlines() if self.log.exists() else []
+
+
+@dataclass(frozen=True)
+class ThreadCountingReach:
+    """Notes in each record how many threads the linear algebra of the worker may use."""
+
+    def __call__(self, request: ReachRequest) -> ReachRecord:
+        import numpy as np
+        import scipy.linalg
+        from threadpoolctl import threadpool_info
+
+        scipy.linalg.solve(np.eye(2), np.ones(2))
+        threads = sorted({pool["num_threads"] for pool in threadpool_info()})
+        return replace(make_record(request), detail=str(threads))
+
+
+def limit_files(size: int, *, fatal: bool) -> None:
+    """Limits the files that this process writes; beyond, it gets EFBIG or its group dies."""
+    if fatal:
+        # The kernel takes the bytes up to the limit, then the write that follows sends SIGXFSZ.
+        signal.signal(signal.SIGXFSZ, lambda *_: os.killpg(0, signal.SIGKILL))
+    hard = resource.getrlimit(resource.RLIMIT_FSIZE)[1]
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
 
 
 def comparable(records: list[ReachRecord]) -> list[str]:

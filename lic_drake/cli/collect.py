@@ -6,8 +6,9 @@ import multiprocessing
 import os
 import shlex
 import sys
+from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from lic_drake.cli import exit_codes
 from lic_drake.cli.arguments import Subparsers, positive_int
@@ -45,7 +46,10 @@ def add_parser(subparsers: Subparsers) -> None:
         " (default: none)",
     )
     parser.add_argument(
-        "--environments", metavar="N", type=int, help="number of environments (default: 20)"
+        "--environments",
+        metavar="N",
+        type=int,
+        help="number of environments of the whole library (default: 20)",
     )
     parser.add_argument(
         "--first", metavar="N", type=int, help="index of the first environment (default: 0)"
@@ -60,8 +64,21 @@ def add_parser(subparsers: Subparsers) -> None:
         "--workers",
         metavar="N",
         type=positive_int,
-        default=os.cpu_count() or 1,
-        help="number of worker processes, 200 MB of memory each (default: CPU count, %(default)s)",
+        help="number of environments at work at a time; a process takes 200 MB of memory (default:"
+        " CPU count, or all workers of the scheduler)",
+    )
+    parser.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="simulate on the workers of a Dask scheduler, for instance tcp://node1:8786 (default:"
+        " in processes on this machine)",
+    )
+    parser.add_argument(
+        "--shard",
+        metavar="K/N",
+        default="1/1",
+        help="simulate only the K-th of N shares of the environments, side by side with the other"
+        " shares, for instance in a job array (default: %(default)s)",
     )
     parser.add_argument(
         "--max-goals",
@@ -83,36 +100,71 @@ def run(args: argparse.Namespace) -> int:
     from tqdm import tqdm
 
     from lic_drake.experience.collect import collect
+    from lic_drake.experience.shard import Shard
     from lic_drake.experience.store import ExperienceLibrary
 
     request = _make_request(args)
+    shard = Shard.parse(args.shard)
+    environments = len(shard.share(request.environment_indices))
     goals, starts = len(request.goals()), len(request.starts())
     print(
-        f"{request.scenario.category}: {request.environments} environments x {goals} goals x"
-        f" {starts} starts = {request.environments * goals * starts} reaches into {args.library}",
+        f"{request.scenario.category}: {environments} environments x {goals} goals x"
+        f" {starts} starts = {environments * goals * starts} reaches into {args.library}",
         flush=True,
     )
     # Off when the output is no terminal, so that logs stay short.
     bar = tqdm(disable=None, bar_format="{percentage:3.0f}%|{bar}| {n_fmt}/{total_fmt}{postfix}")
     try:
-        with bar:
+        with ExitStack() as stack:
+            where = _where(args, stack)
+            stack.enter_context(bar)
             report = collect(
                 ExperienceLibrary(args.library),
                 request,
-                workers=args.workers,
+                shard=shard,
                 progress=lambda progress: _show(bar, progress),
+                **where,
             )
     except KeyboardInterrupt:
         # A second Ctrl-C does not wait for the running reaches.
         for process in multiprocessing.active_children():
             process.kill()
         print(
-            "lic: stopped; finished reaches are kept, go on with:"
-            f" lic collect {shlex.quote(str(args.library))}",
+            f"lic: stopped; finished reaches are kept, go on with: {_same_command(args)}",
             file=sys.stderr,
         )
         return exit_codes.INTERRUPTED
     return _conclude(report)
+
+
+def _where(args: argparse.Namespace, stack: ExitStack) -> dict[str, Any]:
+    """Returns the arguments of `collect` that say where reaches are simulated."""
+    if args.scheduler is None:
+        return {"workers": args.workers or os.cpu_count() or 1}
+    from lic_drake.experience.cluster import Cluster
+
+    cluster = stack.enter_context(Cluster(args.scheduler))
+    if cluster.num_workers() == 0:
+        print(
+            "lic: the scheduler has no workers yet, waiting for some; start them with:"
+            f" dask worker {args.scheduler} --nworkers -1 --nthreads 1",
+            file=sys.stderr,
+        )
+    most = args.workers or sys.maxsize
+    return {
+        "workers": lambda: min(most, cluster.num_workers()),
+        "make_executor": cluster.make_executor,
+    }
+
+
+def _same_command(args: argparse.Namespace) -> str:
+    """Returns the command that goes on with a library."""
+    command = ["lic", "collect", str(args.library)]
+    if args.scheduler is not None:
+        command += ["--scheduler", args.scheduler]
+    if args.shard != "1/1":
+        command += ["--shard", args.shard]
+    return shlex.join(command)
 
 
 def _make_request(args: argparse.Namespace) -> "CollectionRequest":
@@ -141,8 +193,8 @@ def _show(bar: "tqdm[None]", progress: "Progress") -> None:
     left = progress.time_left_s
     clock = "?" if left is None else f"{int(left) // 3600}:{int(left) // 60 % 60:02d} h"
     bar.set_postfix_str(
-        f"{progress.successes} successes, {progress.reaches_per_minute:.0f} reaches/min,"
-        f" {clock} left"
+        f"{progress.successes} successes, {progress.reaches_per_minute:.0f} reaches/min with"
+        f" {progress.at_work} at work, {clock} left"
     )
 
 

@@ -4,6 +4,8 @@ import argparse
 import dataclasses
 import json
 import os
+import shlex
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +13,7 @@ from lic_drake.cli import exit_codes
 from lic_drake.cli.arguments import Subparsers
 
 if TYPE_CHECKING:
+    from lic_drake.experience.check import LibraryReport
     from lic_drake.experience.summary import LibrarySummary
 
 
@@ -45,9 +48,9 @@ def _add_info(actions: Subparsers) -> None:
 def _add_check(actions: Subparsers) -> None:
     parser = actions.add_parser(
         "check",
-        help="look for damaged, duplicate and missing reaches",
-        description="Reads every file of a library in full. Exit code 1 if a file is damaged, a"
-        " reach is there twice, scenarios are mixed, or a reach is missing.",
+        help="say what is there, what is missing and what is damaged",
+        description="Reads every file of a library in full and says what to do. Exit code 1 if a"
+        " file is damaged, a reach is there twice, scenarios are mixed, or a reach is missing.",
         epilog="example: lic experience check out/cylinder",
     )
     _add_library(parser)
@@ -101,7 +104,7 @@ def run_info(args: argparse.Namespace) -> int:
 
 
 def run_check(args: argparse.Namespace) -> int:
-    """Prints what is wrong with a library; returns 1 if anything is."""
+    """Prints what a library holds and lacks; returns 1 if anything is wrong."""
     from lic_drake.experience.check import check_library
     from lic_drake.experience.grid import REQUEST_FILE, read_request
     from lic_drake.experience.store import ExperienceLibrary
@@ -112,16 +115,7 @@ def run_check(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps({**dataclasses.asdict(report), "is_sound": report.is_sound}, indent=2))
         return 0 if report.is_sound else exit_codes.INCOMPLETE
-    missing = "unknown (no request)" if report.missing is None else report.missing
-    print(f"shards      {report.shards}")
-    print(f"reaches     {report.reaches}, and {report.journalled} in journals")
-    print(f"scenarios   {', '.join(report.scenarios) or 'none'}")
-    print(f"damaged     {len(report.damaged)}")
-    for line in report.damaged:
-        print(f"            {line}")
-    print(f"duplicates  {len(report.duplicates)} {' '.join(report.duplicates[:5])}".rstrip())
-    print(f"missing     {missing}")
-    print("sound" if report.is_sound else "NOT SOUND")
+    print("\n".join(_check_lines(report, args.library, is_own=not args.request)))
     return 0 if report.is_sound else exit_codes.INCOMPLETE
 
 
@@ -133,6 +127,51 @@ def run_merge(args: argparse.Namespace) -> int:
     rows = merge_libraries([ExperienceLibrary(path) for path in args.sources], args.output)
     print(f"{rows} reaches in {args.output}")
     return 0
+
+
+def _check_lines(report: "LibraryReport", library: Path, is_own: bool) -> list[str]:
+    """Returns the lines of a report; the last one is the verdict, with what to do."""
+    lines = [
+        f"reaches     {report.reaches} in {report.shards} files",
+        f"journals    {report.journalled} more reaches of tasks at work or interrupted"
+        + (f"; {report.lost_lines} damaged lines" if report.lost_lines else ""),
+        f"missing     {_missing(report)}",
+        f"scenarios   {', '.join(report.scenarios) or 'none'}",
+        f"duplicates  {len(report.duplicates)} {' '.join(report.duplicates[:5])}".rstrip(),
+        f"damaged     {len(report.damaged)}",
+        *(f"            {file.reason}" for file in report.damaged),
+    ]
+    go_on = f"lic collect {shlex.quote(str(library))}"
+    if report.damaged and library.is_dir():
+        aside = shlex.quote(str(library / "_damaged"))
+        names = shlex.join(str(library / file.name) for file in report.damaged)
+        lines.append(f"DAMAGED; repair with: mkdir -p {aside} && mv {names} {aside} && {go_on}")
+    elif report.damaged:
+        lines.append("DAMAGED; restore the file, or collect its reaches again")
+    elif len(report.scenarios) > 1:
+        lines.append("MIXED; keep one library per scenario")
+    elif report.duplicates:
+        lines.append("DUPLICATES; merge into a new library: lic experience merge --help")
+    elif report.missing:
+        lines.append(f"INCOMPLETE; go on with: {go_on}" if is_own else "INCOMPLETE")
+    else:
+        lines.append("sound" if report.requested is None else "complete")
+    return lines
+
+
+def _missing(report: "LibraryReport") -> str:
+    """Returns how many reaches are missing, and in which environments."""
+    if report.missing is None:
+        return "unknown, without a request"
+    if report.missing == 0:
+        return f"0 of {report.requested}"
+    # Consecutive indices differ from their rank by the same number.
+    runs = [
+        [index for _, index in group]
+        for _, group in groupby(enumerate(report.incomplete), lambda pair: pair[1] - pair[0])
+    ]
+    spans = [str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs]
+    return f"{report.missing} of {report.requested}, in environments {', '.join(spans)}"
 
 
 def _lines(library: Path, summary: "LibrarySummary") -> list[str]:

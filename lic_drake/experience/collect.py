@@ -4,14 +4,15 @@ An environment is a task, and a task makes one shard.
 """
 
 import time
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, Executor
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
+from pathlib import Path
+from queue import Empty, SimpleQueue
 
-import pyarrow as pa
-
-from lic_drake.errors import LibraryError
+from lic_drake.errors import ClusterError, LibraryError
 from lic_drake.experience.grid import (
     REQUEST_FILE,
     CollectionRequest,
@@ -19,19 +20,17 @@ from lic_drake.experience.grid import (
     write_request,
 )
 from lic_drake.experience.journal import journal_path
-from lic_drake.experience.lock import CollectionLock
-from lic_drake.experience.progress import Progress, ProgressFunction
+from lic_drake.experience.lock import CollectionLock, starting
+from lic_drake.experience.progress import Progress, ProgressFunction, Reporter
 from lic_drake.experience.schema import read_table
-from lic_drake.experience.slots import Slot, TaskState
+from lic_drake.experience.shard import WHOLE, Shard
+from lic_drake.experience.slots import MAX_BREAKS, Slot, TaskState
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.experience.task import ReachFunction, Task, simulate
 from lic_drake.experience.workers import make_process_pool
 
 POLL_S = 0.5
-"""Wall time between two looks at the journals, seconds."""
-
-MAX_BREAKS = 2
-"""A task that ended this many workers is left out."""
+"""Wall time between two looks at what is going on, seconds."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +63,8 @@ def collect(
     library: ExperienceLibrary,
     request: CollectionRequest,
     *,
-    workers: int = 1,
+    shard: Shard = WHOLE,
+    workers: int | Callable[[], int] = 1,
     make_executor: Callable[[], Executor] = make_process_pool,
     reach: ReachFunction = simulate,
     progress: ProgressFunction | None = None,
@@ -79,39 +79,61 @@ def collect(
         library: A folder; made if absent.
         request: What the library is to hold. A library that was begun before only takes the same
             request, or one with more environments.
-        workers: Number of tasks at work at a time.
-        make_executor: Makes an executor for one task at a time. Its workers must see the
-            library's folder; `lambda: client.get_executor()` uses a Dask cluster.
+        shard: The share of the environments to simulate; collections of other shares of the same
+            division may be at work on the same library.
+        workers: Number of tasks at work at a time; a function where that changes, as in
+            `Cluster.num_workers`.
+        make_executor: Makes an executor for one task at a time, for instance
+            `Cluster.make_executor`. Its workers must see the library's folder.
         reach: Simulates a request; a top-level function.
         progress: Is called about twice a second.
 
     Raises:
         LibraryError: The library belongs to another request, holds a damaged file, or cannot be
             written. Workers have stopped, finished reaches are kept.
+        ClusterError: The cluster cannot be used; as above.
         KeyboardInterrupt: As on Ctrl-C; workers have stopped, finished reaches are kept.
     """
     library.create()
-    with CollectionLock(library.path) as lock:
-        _record_request(library, request)
-        collection = _Collection(library, request, reach)
-        slots = [Slot(make_executor) for _ in range(min(workers, len(collection.waiting)))]
+    slots: list[Slot] = []
+    idle: list[Slot] = []
+    ended: SimpleQueue[Slot] = SimpleQueue()
+    with ExitStack() as stack:
+        with starting(library.path):
+            lock = stack.enter_context(CollectionLock(library.path, shard))
+            _record_request(library, request)
+        collection = _Collection(library, request, shard, lock.path, reach)
+
+        def look() -> Progress:
+            for slot in slots:
+                slot.poll()
+            return collection.progress(at_work=len(slots) - len(idle))
+
+        reporter = Reporter(progress, look, POLL_S)
         try:
-            while collection.waiting or any(slot.state for slot in slots):
-                for slot in slots:
-                    if collection.waiting and slot.state is None:
-                        slot.start(collection.waiting.popleft())
-                for state, error in Slot.wait(slots, POLL_S):
-                    if error is not None:
-                        collection.handle(state, error)
-                if progress is not None:
-                    progress(collection.progress())
+            while collection.waiting or len(idle) < len(slots):
+                allowed = workers() if callable(workers) else workers
+                while collection.waiting and len(slots) - len(idle) < allowed:
+                    if not idle:
+                        slots.append(Slot(make_executor, ended))
+                        idle.append(slots[-1])
+                    idle[-1].start(collection.waiting.popleft())
+                    idle.pop()
+                with suppress(Empty):
+                    slot = ended.get(timeout=POLL_S)
+                    idle.append(slot)
+                    collection.conclude(*slot.take())
+                reporter.report()
+        except (LibraryError, ClusterError) as error:
+            raise type(error)(
+                f"{error}; finished reaches are kept, run the same command to go on"
+            ) from error
         finally:
             lock.stop_workers()
             for slot in slots:
                 slot.close()
-            final = collection.progress()
-            if progress is not None:
-                progress(final)
+            idle[:] = slots
+            final = reporter.finish()
     return CollectionReport(progress=final, failed=tuple(collection.failed))
 
 
@@ -124,26 +146,39 @@ class _Collection:
     """
 
     def __init__(
-        self, library: ExperienceLibrary, request: CollectionRequest, reach: ReachFunction
+        self,
+        library: ExperienceLibrary,
+        request: CollectionRequest,
+        shard: Shard,
+        lock: Path,
+        reach: ReachFunction,
     ) -> None:
         self._began = time.monotonic()
-        held = _held(library)
-        self._total = self._stored = self._stored_successes = 0
+        held = _held(library, request.stream)
+        digest = request.scenario.digest
+        num_reaches = len(request.goals()) * len(request.starts())
+        environments = shard.share(request.environment_indices)
+        self._total = num_reaches * len(environments)
+        self._stored = self._stored_successes = 0
         self._states: list[TaskState] = []
-        for environment in request.environment_indices:
-            keys = {item.key for item in request.reaches(environment)}
-            missing = frozenset(keys - held.keys())
-            self._total += len(keys)
-            self._stored += len(keys) - len(missing)
-            self._stored_successes += sum(held[key] for key in keys - missing)
+        for environment in environments:
+            missing = None
+            if environment in held:
+                successes = held[environment]
+                keys = {item.key for item in request.reaches(environment)}
+                missing = frozenset(keys - successes.keys())
+                self._stored += len(keys) - len(missing)
+                self._stored_successes += sum(successes[key] for key in keys - missing)
             task = Task(
-                library=library.path,
+                library=library.path.absolute(),
+                lock=lock.absolute(),
                 request=request,
+                scenario_digest=digest,
                 environment=environment,
                 missing=missing,
                 reach=reach,
             )
-            if missing:
+            if missing is None or missing:
                 self._states.append(TaskState(task))
             else:  # A kill between writing the shard and deleting the journal leaves both.
                 journal_path(task.shard).unlink(missing_ok=True)
@@ -151,27 +186,32 @@ class _Collection:
         self.waiting = deque(self._states)
         self.failed: list[FailedTask] = []
 
-    def handle(self, state: TaskState, error: Exception) -> None:
-        """Decides what becomes of a task that ended with an error.
+    def conclude(self, state: TaskState, error: Exception | None) -> None:
+        """Decides what becomes of a task that ended, perhaps with an error.
 
         Raises:
             LibraryError: The task could not write; the others could not either.
+            ClusterError: The task has no cluster any more; the others have none either.
         """
-        if isinstance(error, LibraryError):
-            raise LibraryError(f"{error}; finished reaches are kept, run the same command to go on")
+        if error is None:
+            return
+        if isinstance(error, LibraryError | ClusterError):
+            raise error
         if isinstance(error, BrokenExecutor):
-            state.breaks += 1
-            if state.breaks < MAX_BREAKS:
+            if not state.is_deadly():
                 self.waiting.append(state)
                 return
-            reason = f"its worker process died {MAX_BREAKS} times"
+            reason = f"its worker process died {MAX_BREAKS} times at the same reach"
+            if deadly := state.next_reach():
+                reason += f", from start {deadly.start} to goal {deadly.goal}"
         else:
             reason = " ".join(f"{type(error).__name__}: {error}".split())
         self.failed.append(FailedTask(environment=state.task.environment, reason=reason))
 
-    def progress(self) -> Progress:
+    def progress(self, at_work: int) -> Progress:
         """Returns the present state, as far as the journals were looked at."""
         return Progress(
+            at_work=at_work,
             total=self._total,
             present=self._present,
             done=self._stored + sum(state.finished for state in self._states),
@@ -196,11 +236,12 @@ def _record_request(library: ExperienceLibrary, request: CollectionRequest) -> N
     write_request(request, path)
 
 
-def _held(library: ExperienceLibrary) -> dict[str, bool]:
-    """Returns the keys of all reaches in a library with their success."""
-    columns = ["key", "success"]
-    tables = [read_table(path, columns) for path in library.shard_paths()]
-    if not tables:
-        return {}
-    table = pa.concat_tables([table.replace_schema_metadata() for table in tables])
-    return dict(zip(*(table.column(name).to_pylist() for name in columns), strict=True))
+def _held(library: ExperienceLibrary, stream: str) -> dict[int, dict[str, bool]]:
+    """Returns environment -> key -> success of all reaches of a stream in a library."""
+    held: defaultdict[int, dict[str, bool]] = defaultdict(dict)
+    for path in library.shard_paths():
+        table = read_table(path, ["stream", "environment", "key", "success"])
+        for row in zip(*(column.to_pylist() for column in table.columns), strict=True):
+            if row[0] == stream:
+                held[row[1]][row[2]] = row[3]
+    return held

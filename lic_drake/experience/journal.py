@@ -32,13 +32,17 @@ class Journal:
     def __init__(self, path: Path) -> None:
         """Opens or creates the journal and drops what a kill left of an unfinished line.
 
+        A damaged line among whole ones costs only its own reach.
+
         Raises:
             LibraryError: The file cannot be opened.
         """
         self._path = path
         with readable_errors(path, "write"):
             self._file = open_locked(path, wait=True)
-            self.records, length = _parse(self._file.read())
+            content = self._file.read()
+            self.records, _ = _parse(content)
+            length = content.rfind(b"\n") + 1
             self._file.truncate(length)
             self._file.seek(length)
 
@@ -104,23 +108,25 @@ def _write_all(file: BinaryIO, line: bytes) -> None:
         line = line[file.write(line) :]
 
 
+def read_journal(path: Path) -> tuple[list[ReachRecord], int]:
+    """Returns the records of a journal, also one in use, and its number of damaged lines.
+
+    Raises:
+        LibraryError: The file cannot be read.
+    """
+    with readable_errors(path, "read"):
+        return _parse(path.read_bytes())
+
+
 def _parse(content: bytes) -> tuple[list[ReachRecord], int]:
-    """Returns the records up to the first broken line, and the length of their lines."""
-    records: list[ReachRecord] = []
-    length = 0
-    for line in content.splitlines(keepends=True):
-        record = _parse_line(line)
-        if record is None:
-            break
-        records.append(record)
-        length += len(line)
-    return records, length
+    """Returns the records in the whole lines, and the number of lines that hold none."""
+    found = [_parse_line(line) for line in content.split(b"\n")[:-1]]
+    records = [record for record in found if record is not None]
+    return records, len(found) - len(records)
 
 
 def _parse_line(line: bytes) -> ReachRecord | None:
-    """Returns the record of a whole line, or None."""
-    if not line.endswith(b"\n"):
-        return None
+    """Returns the record of a line, or None."""
     try:
         data: dict[str, Any] = json.loads(line)
         for name in TUPLES:
@@ -130,9 +136,14 @@ def _parse_line(line: bytes) -> ReachRecord | None:
         return None
 
 
+def journal_paths(library: Path) -> list[Path]:
+    """Returns the journals in a library's folder, sorted by name."""
+    return sorted(library.glob(f"_*{SUFFIX}"))
+
+
 def unfinished_reaches(library: Path) -> int:
     """Returns the number of finished reaches in the journals of a library's folder."""
-    tails = [JournalTail(path) for path in library.glob(f"_*{SUFFIX}")]
+    tails = [JournalTail(path) for path in journal_paths(library)]
     for tail in tails:
         tail.poll()
     return sum(tail.finished for tail in tails)

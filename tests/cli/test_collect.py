@@ -1,5 +1,6 @@
 import os
 import pty
+import socket
 import subprocess
 import sys
 import termios
@@ -117,6 +118,40 @@ def test_failed_environments_are_listed_and_make_exit_code_1(
     assert "24 of 36 reaches" in output
     assert "lic: environment 1 failed: ArithmeticError: no such environment\n" in error
     assert "the library is incomplete; run the same command to try again" in error
+
+
+def test_a_shard_is_a_share_of_the_environments(
+    collect: Collect, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert collect("--environments", "5", *SMALL, "--shard", "2/3") == 0
+    output = capsys.readouterr().out
+    assert "2 environments x 4 goals x 3 starts = 24 reaches into" in output
+    assert "24 of 24 reaches (24 new in " in output
+    assert read_request(tmp_path / "new" / REQUEST_FILE) == make_request(environments=5)
+    assert collect("--shard", "0/3") == 2
+    assert "a shard is k/n with k from 1 to n, got 0/3; start the job" in capsys.readouterr().err
+
+
+def test_a_scheduler_that_is_not_there_is_one_line(
+    collect: Collect, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("distributed", reason="Dask is missing: pip install 'lic_drake[cluster]'")
+    monkeypatch.setattr("lic_drake.experience.cluster.CONNECT_S", 0.5)
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
+        for wrong, reason in ((address, "silence for 0.5 s"), ("node1", "missing port number")):
+            assert collect(*SMALL, "--scheduler", wrong) == 2
+            error = capsys.readouterr().err
+            assert error.startswith(f"lic: error: no Dask scheduler answers at '{wrong}' ({reason}")
+            assert error.count("\n") == 1
+
+
+def test_without_dask_a_scheduler_is_refused_with_the_way_to_install_it(
+    collect: Collect, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    assert collect(*SMALL, "--scheduler", "tcp://127.0.0.1:8786") == 2
+    assert 'install it with: pip install "lic_drake[cluster]"\n' in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("path", ["file", "file/below"])

@@ -24,14 +24,15 @@ def library(tmp_path: Path) -> ExperienceLibrary:
 
 def test_a_complete_library_is_sound(library: ExperienceLibrary) -> None:
     report = check_library(library, REQUEST)
-    assert (report.shards, report.reaches, report.missing) == (3, 36, 0)
+    assert (report.shards, report.reaches, report.requested, report.missing) == (3, 36, 36, 0)
+    assert report.incomplete == ()
     assert report.scenarios == (REQUEST.scenario.digest,)
     assert report.is_sound
 
 
 def test_without_a_request_completeness_stays_open(library: ExperienceLibrary) -> None:
     report = check_library(library)
-    assert report.missing is None
+    assert (report.requested, report.missing, report.incomplete) == (None, None, ())
     assert report.is_sound
 
 
@@ -42,8 +43,30 @@ def test_missing_reaches_are_counted_also_when_they_are_in_a_journal(
     with Journal(journal_path(library.shard_path("shard-1"))) as journal:
         journal.append(RECORDS[1][0])
     report = check_library(library, REQUEST)
-    assert (report.missing, report.journalled) == (12, 1)
+    assert (report.missing, report.journalled, report.incomplete) == (12, 1, (1,))
     assert not report.is_sound
+
+
+def test_a_journal_that_a_kill_left_beside_its_shard_adds_nothing(
+    library: ExperienceLibrary,
+) -> None:
+    with Journal(journal_path(library.shard_path("shard-1"))) as journal:
+        for record in RECORDS[1]:
+            journal.append(record)
+    report = check_library(library, REQUEST)
+    assert (report.journalled, report.missing, report.is_sound) == (0, 0, True)
+
+
+def test_damaged_lines_of_a_journal_are_counted(library: ExperienceLibrary) -> None:
+    library.shard_path("shard-1").unlink()
+    path = journal_path(library.shard_path("shard-1"))
+    with Journal(path) as journal:
+        for record in RECORDS[1][:4]:
+            journal.append(record)
+    lines = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b"".join([lines[0], b"\0" * 500 + b"\n", *lines[2:]]))
+    report = check_library(library, REQUEST)
+    assert (report.journalled, report.lost_lines, report.missing) == (3, 1, 12)
 
 
 def test_damaged_files_are_named_and_the_others_counted(library: ExperienceLibrary) -> None:
@@ -51,10 +74,9 @@ def test_damaged_files_are_named_and_the_others_counted(library: ExperienceLibra
     shard.write_bytes(shard.read_bytes()[:1000])
     (library.path / "empty.parquet").touch()
     report = check_library(library, REQUEST)
-    assert [Path(line.split()[0]).name for line in report.damaged] == [
-        "empty.parquet",
-        "shard-1.parquet",
-    ]
+    assert [file.name for file in report.damaged] == ["empty.parquet", "shard-1.parquet"]
+    assert all(f"{file.name} is damaged" in file.reason for file in report.damaged)
+    assert report.incomplete == (1,)
     assert (report.reaches, report.missing, report.is_sound) == (24, 12, False)
 
 

@@ -18,6 +18,7 @@ from lic_drake.experience.grid import REQUEST_FILE, read_request
 from lic_drake.experience.journal import Journal, journal_path
 from lic_drake.experience.merge import merge_libraries
 from lic_drake.experience.progress import Progress
+from lic_drake.experience.shard import Shard
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.scenario import load_scenario
@@ -88,6 +89,38 @@ def test_another_request_is_refused_before_anything_is_simulated(
         run(library, reach, request=replace(REQUEST, scenario=other))
     assert names(library) == before[1:]
     assert len(reach.calls()) == 36
+
+
+def test_shards_share_the_environments_and_any_collection_completes_them(
+    library: ExperienceLibrary, reach: FakeReach
+) -> None:
+    larger = replace(REQUEST, environments=5)
+    report = run(library, reach, request=larger, shard=Shard(2, 3))
+    assert (report.progress.total, report.progress.done) == (24, 24)
+    assert names(library) == [REQUEST_FILE, "training-000001.parquet", "training-000004.parquet"]
+    assert read_request(library.path / REQUEST_FILE) == larger
+    assert run(library, reach, request=larger, shard=Shard(7, 7)).progress.total == 0
+    rest = run(library, reach, request=larger)
+    assert (rest.progress.total, rest.progress.present) == (60, 24)
+    assert comparable(library.records()) == expected_records(larger)
+    assert len(reach.calls()) == 60
+
+
+def test_the_number_of_tasks_at_work_follows_the_number_of_workers(
+    library: ExperienceLibrary, reach: FakeReach, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(dut, "POLL_S", 0.02)
+    counts = iter([0, 0, 1, 1])
+    seen: list[int] = []
+    run(
+        library,
+        replace(reach, sleep_s=0.02),
+        workers=lambda: next(counts, 3),
+        progress=lambda progress: seen.append(progress.at_work),
+    )
+    assert seen[:4] == [0, 0, 1, 1]
+    assert max(seen) == 3
+    assert comparable(library.records()) == expected_records(REQUEST)
 
 
 def test_reaches_that_came_from_elsewhere_are_not_simulated_again(

@@ -6,7 +6,7 @@ import pytest
 from fake_reach import comparable, make_record, make_request
 
 from lic_drake.errors import LibraryError
-from lic_drake.experience.journal import Journal, JournalTail
+from lic_drake.experience.journal import Journal, JournalTail, read_journal
 
 RECORDS = [make_record(item) for item in make_request().reaches(0)]
 
@@ -44,6 +44,23 @@ def test_what_is_no_record_is_dropped(path: Path, junk: bytes) -> None:
     path.write_bytes(path.read_bytes() + junk)
     with Journal(path) as journal:
         assert comparable(journal.records) == comparable(RECORDS[:6])
+
+
+def test_damage_in_the_middle_costs_only_its_own_lines(path: Path) -> None:
+    lines = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b"".join([*lines[:2], b"\0" * 4096 + b"\n", *lines[3:]]))
+    with Journal(path) as journal:
+        assert comparable(journal.records) == comparable(RECORDS[:2] + RECORDS[3:6])
+        journal.append(RECORDS[7])
+    records, damaged = read_journal(path)
+    assert comparable(records) == comparable([*RECORDS[:2], *RECORDS[3:6], RECORDS[7]])
+    assert damaged == 1
+
+
+def test_a_journal_in_use_is_read_up_to_its_last_whole_line(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-10])
+    records, damaged = read_journal(path)
+    assert (comparable(records), damaged) == (comparable(RECORDS[:5]), 0)
 
 
 def test_a_file_that_cannot_grow_keeps_its_whole_lines(path: Path) -> None:
