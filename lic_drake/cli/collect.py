@@ -12,13 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 from lic_drake.cli import exit_codes
 from lic_drake.cli.arguments import Subparsers, positive_int
+from lic_drake.cli.progress import ProgressDisplay
 
 if TYPE_CHECKING:
-    from tqdm import tqdm
-
     from lic_drake.experience.collect import CollectionReport
     from lic_drake.experience.grid import CollectionRequest
-    from lic_drake.experience.progress import Progress
 
 DEFAULT_SCENARIO = "cylinder-clutter"
 
@@ -97,8 +95,6 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Collects; returns 0 when the library is complete, 1 when environments failed."""
-    from tqdm import tqdm
-
     from lic_drake.experience.collect import collect
     from lic_drake.experience.shard import Shard
     from lic_drake.experience.store import ExperienceLibrary
@@ -112,17 +108,15 @@ def run(args: argparse.Namespace) -> int:
         f" {starts} starts = {environments * goals * starts} reaches into {args.library}",
         flush=True,
     )
-    # Off when the output is no terminal, so that logs stay short.
-    bar = tqdm(disable=None, bar_format="{percentage:3.0f}%|{bar}| {n_fmt}/{total_fmt}{postfix}")
     try:
         with ExitStack() as stack:
             where = _where(args, stack)
-            stack.enter_context(bar)
+            display = stack.enter_context(ProgressDisplay())
             report = collect(
                 ExperienceLibrary(args.library),
                 request,
                 shard=shard,
-                progress=lambda progress: _show(bar, progress),
+                progress=display.show,
                 **where,
             )
     except KeyboardInterrupt:
@@ -185,17 +179,6 @@ def _make_request(args: argparse.Namespace) -> "CollectionRequest":
         given["scenario"] = load_scenario(args.scenario or DEFAULT_SCENARIO, args.set or "")
     values = {name: value for name, value in given.items() if value is not None}
     return CollectionRequest(**{**(vars(stored) if stored else {}), **values})
-
-
-def _show(bar: "tqdm[None]", progress: "Progress") -> None:
-    """Moves the progress bar."""
-    bar.total, bar.n = progress.total, progress.done
-    left = progress.time_left_s
-    clock = "?" if left is None else f"{int(left) // 3600}:{int(left) // 60 % 60:02d} h"
-    bar.set_postfix_str(
-        f"{progress.successes} successes, {progress.reaches_per_minute:.0f} reaches/min with"
-        f" {progress.at_work} at work, {clock} left"
-    )
 
 
 def _conclude(report: "CollectionReport") -> int:

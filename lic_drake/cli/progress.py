@@ -1,0 +1,52 @@
+"""How a collection shows its progress: a bar in a terminal, a line a minute in a log."""
+
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+if TYPE_CHECKING:
+    from lic_drake.experience.progress import Progress
+
+LOG_EVERY_S = 60.0
+"""Time between two lines in a log, seconds."""
+
+
+class ProgressDisplay:
+    """A context manager; `show` takes the progress as often as there is any."""
+
+    def __init__(self) -> None:
+        from tqdm import tqdm
+
+        # None: off where the output is no terminal.
+        self._bar = tqdm(
+            disable=None, bar_format="{percentage:3.0f}%|{bar}| {n_fmt}/{total_fmt}{postfix}"
+        )
+        self._next_line_s = LOG_EVERY_S
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._bar.close()
+
+    def show(self, progress: "Progress") -> None:
+        """Shows how far the collection is."""
+        if not self._bar.disable:
+            self._bar.total, self._bar.n = progress.total, progress.done
+            self._bar.set_postfix_str(_describe(progress))
+        elif progress.elapsed_s >= self._next_line_s:
+            print(f"{progress.done}/{progress.total} reaches, {_describe(progress)}", flush=True)
+            self._next_line_s = progress.elapsed_s + LOG_EVERY_S
+
+
+def _describe(progress: "Progress") -> str:
+    left = progress.time_left_s
+    clock = "?" if left is None else f"{int(left) // 3600}:{int(left) // 60 % 60:02d} h"
+    return (
+        f"{progress.successes} successes, {progress.reaches_per_minute:.0f} reaches/min with"
+        f" {progress.at_work} at work, {clock} left"
+    )
