@@ -9,7 +9,8 @@ import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from lic_drake.experience.grid import CollectionRequest
+from lic_drake.experience.grid import REQUEST_FILE, CollectionRequest, write_request
+from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.scenario import load_scenario
 
@@ -19,6 +20,16 @@ def make_request(**values: object) -> CollectionRequest:
     scenario = load_scenario("cylinder-clutter")
     defaults = {"scenario": scenario, "environments": 3, "max_goals": 4, "max_starts": 3}
     return CollectionRequest(**{**defaults, **values})
+
+
+def fill_library(path: Path) -> Path:
+    """Makes a complete library of the records below: 3 environments x 4 goals x 3 starts."""
+    library, request = ExperienceLibrary(path), make_request()
+    for environment in request.environment_indices:
+        records = [make_record(item) for item in request.reaches(environment)]
+        library.write_shard(f"training-{environment:06d}", records, request.scenario)
+    write_request(request, path / REQUEST_FILE)
+    return path
 
 
 def make_record(request: ReachRequest) -> ReachRecord:

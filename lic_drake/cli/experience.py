@@ -1,4 +1,4 @@
-"""`lic experience`: looks at, checks and merges experience libraries."""
+"""`lic experience`: looks at, checks, recomputes and merges experience libraries."""
 
 import argparse
 import dataclasses
@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lic_drake.cli import exit_codes
-from lic_drake.cli.arguments import Subparsers
+from lic_drake.cli.arguments import Subparsers, positive_int
 
 if TYPE_CHECKING:
     from lic_drake.experience.check import LibraryReport
@@ -21,14 +21,15 @@ def add_parser(subparsers: Subparsers) -> None:
     """Adds the subcommand to the command line."""
     parser = subparsers.add_parser(
         "experience",
-        help="look at, check or merge experience libraries",
-        description="Looks at, checks or merges experience libraries: folders of Parquet files"
-        " with one row per reach, which also open in pandas.",
+        help="look at, check, recompute or merge experience libraries",
+        description="Looks at, checks, recomputes or merges experience libraries: folders of"
+        " Parquet files with one row per reach, which also open in pandas.",
         epilog="example: lic experience info out/cylinder",
     )
     actions = parser.add_subparsers(title="actions", metavar="ACTION", required=True)
     _add_info(actions)
     _add_check(actions)
+    _add_recompute(actions)
     _add_merge(actions)
 
 
@@ -62,6 +63,25 @@ def _add_check(actions: Subparsers) -> None:
     )
     _add_json(parser)
     parser.set_defaults(run=run_check)
+
+
+def _add_recompute(actions: Subparsers) -> None:
+    parser = actions.add_parser(
+        "recompute",
+        help="simulate random rows again and compare them bit for bit",
+        description="Simulates random rows of a library again. Exit code 1 if any differs in any"
+        " bit of any field but the wall time. Meant for the machine that collected the library:"
+        " other processors round otherwise.",
+        epilog="example: lic experience recompute out/cylinder --rows 200",
+    )
+    _add_library(parser)
+    parser.add_argument(
+        "--rows", metavar="N", type=positive_int, default=100, help="default: %(default)s"
+    )
+    parser.add_argument(
+        "--seed", metavar="N", type=int, default=0, help="draws the rows (default: %(default)s)"
+    )
+    parser.set_defaults(run=run_recompute)
 
 
 def _add_merge(actions: Subparsers) -> None:
@@ -117,6 +137,23 @@ def run_check(args: argparse.Namespace) -> int:
         return 0 if report.is_sound else exit_codes.INCOMPLETE
     print("\n".join(_check_lines(report, args.library, is_own=not args.request)))
     return 0 if report.is_sound else exit_codes.INCOMPLETE
+
+
+def run_recompute(args: argparse.Namespace) -> int:
+    """Simulates rows again; returns 1 if one differs."""
+    import numpy as np
+    from tqdm import tqdm
+
+    from lic_drake.experience.recompute import recompute
+    from lic_drake.experience.store import ExperienceLibrary
+
+    library, rng = ExperienceLibrary(args.library), np.random.default_rng(args.seed)
+    with tqdm(total=args.rows, disable=None, unit="rows") as bar:
+        differing = recompute(library, args.rows, rng, progress=lambda _: bar.update())
+    print(f"{args.rows - len(differing)} of {args.rows} rows are the same to the last bit")
+    for row in differing:
+        print(f"{row.key}: {' -> '.join(row.outcomes)}, other {', '.join(row.fields)}")
+    return exit_codes.INCOMPLETE if differing else 0
 
 
 def run_merge(args: argparse.Namespace) -> int:
