@@ -56,6 +56,7 @@ def make_engines(step_ms: float) -> tuple[list[Engine], list[tuple[str, str]]]:
     engines = [drake, mujoco[0], same_step, mujoco[1], drake_awake, mujoco_awake, same_awake]
     pairs = [
         (drake, mujoco[0]),
+        (drake, mujoco_awake),
         (same_step, mujoco[0]),
         (drake_awake, mujoco_awake),
         (same_awake, mujoco_awake),

@@ -21,6 +21,7 @@ from reaches import free_space, reach_request, small_clutter
 from worlds import box, cylinder, make_clutter
 
 from lic_drake.control.mpc import HapticMpc
+from lic_drake.evaluate.batch import random_requests
 from lic_drake.reach import recording, rollout, waking
 from lic_drake.reach.diagram import ReachDiagram, make_reach_diagram
 from lic_drake.reach.recording import ReachRecording
@@ -135,10 +136,9 @@ def growth_mb(reach: Callable[[int], Any], first: int, count: int) -> float:
 
 
 @pytest.mark.slow
-def test_a_thousand_reaches_need_no_more_memory_than_a_hundred() -> None:
-    scenario = load_scenario("cylinder-clutter", "{stop: {timeout_s: 0.04}}")
-
-    def reach(i: int) -> None:
-        run_reach(reach_request(scenario, environment=i // 4))
-
-    assert growth_mb(reach, 100, 1000) < 30.0
+def test_five_thousand_reaches_need_no_more_memory_than_five_hundred() -> None:
+    scenario = load_scenario("cylinder-clutter", "{stop: {timeout_s: 0.4}}")
+    requests = random_requests(scenario, "training", 250, 20)
+    growth = growth_mb(lambda i: run_reach(requests[i]), 500, 5000)
+    print(f"grew by {growth:.1f} MB")
+    assert growth < 30.0
