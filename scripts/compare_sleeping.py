@@ -60,7 +60,6 @@ def main() -> int:
     outcomes = sum(a.outcome != b.outcome for a, b in zip(asleep, awake, strict=True))
     apart = np.array([[abs(getattr(a, f) - getattr(b, f)) for f in FIGURES] for a, b in pairs])
     close = np.mean(apart[:, :3].max(axis=1) < TIGHT)
-    cost = [sum(r.wall_time_s for r in rows) for rows in zip(*pairs, strict=True)]
     lines = [
         f"- {len(asleep)} requests, {len(pairs)} simulated in both ways",
         f"- other outcome: {outcomes} ({100 * outcomes / len(asleep):.2f} %)",
@@ -68,7 +67,6 @@ def main() -> int:
         f" only asleep {int(np.sum(won[:, 0] & ~won[:, 1]))}, only awake"
         f" {int(np.sum(~won[:, 0] & won[:, 1]))}, McNemar p = {mcnemar(won[:, 0], won[:, 1]):.2f}",
         f"- same final pose within {TIGHT:g}: {100 * close:.1f} %",
-        f"- wall time awake / asleep: {cost[1] / cost[0]:.2f}",
         "",
         "| figure | median difference | 95th percentile | largest |",
         "|---|---|---|---|",
