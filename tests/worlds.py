@@ -66,6 +66,32 @@ def _one(
     )
 
 
+def corners(instance: ClutterInstance, i: int) -> np.ndarray:
+    """Corners of a box of an instance, seen from above, shape (4, 2)."""
+    half = 0.5 * instance.size[i, :2]
+    c, s = np.cos(instance.yaw[i]), np.sin(instance.yaw[i])
+    signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    return instance.p_WO[i, :2] + (signs * half) @ np.array([[c, s], [-s, c]])
+
+
+def gap_to_boxes(q: np.ndarray, instance: ClutterInstance) -> float:
+    """Distance in the plane from the arm's skin to the boxes of an instance, negative inside."""
+    R_WL, p_WL = ARM.link_poses(q)
+    gaps = []
+    for capsule in ARM.skin:
+        link = ARM.link_names.index(capsule.link)
+        half = 0.5 * capsule.length * capsule.R_LC[:, 2]
+        p_LA = capsule.p_LC + np.linspace(-1.0, 1.0, 400)[:, np.newaxis] * half
+        p_WA = (p_WL[link] + p_LA @ R_WL[link].T)[:, :2]
+        for i in range(instance.num_objects):
+            c, s = np.cos(instance.yaw[i]), np.sin(instance.yaw[i])
+            outside = np.abs((p_WA - instance.p_WO[i, :2]) @ np.array([[c, -s], [s, c]]))
+            outside -= 0.5 * instance.size[i, :2]
+            distance = np.linalg.norm(np.maximum(outside, 0.0), axis=1)
+            gaps.append((distance + np.minimum(outside.max(axis=1), 0.0)).min() - capsule.radius)
+    return float(min(gaps))
+
+
 @dataclass(kw_only=True)
 class World:
     """Arm and clutter with fixed equilibrium angles, and a context of the whole."""

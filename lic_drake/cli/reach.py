@@ -35,9 +35,9 @@ def add_parser(subparsers: Subparsers) -> None:
         "--goal",
         type=float,
         nargs=2,
-        default=(0.6, 0.0),
         metavar=("X", "Y"),
-        help="goal in metres, x into the clutter, y to the left (default: 0.6 0)",
+        help="goal in metres, x into the clutter, y to the left (default: the one that the"
+        " environment offers, else 0.6 0)",
     )
     parser.add_argument(
         "--start-y",
@@ -83,7 +83,10 @@ def run(args: argparse.Namespace) -> int:
     from lic_drake.reach.scenario import load_scenario
 
     scenario = load_scenario(args.scenario, args.set)
-    p_WG = np.array([*args.goal, 0.0])
+    if args.goal is None and scenario.task.goal_area is None:
+        p_WG = scenario.sample_goal(args.stream, args.environment)
+    else:
+        p_WG = np.array([*(args.goal or (0.6, 0.0)), 0.0])
     check_goal(scenario, p_WG)
     x0 = np.array([scenario.task.start_line.x_m, args.start_y, np.deg2rad(args.start_phi)])
     if not np.all(np.isfinite(x0)):

@@ -22,6 +22,8 @@ class ClutterInstance:
         yaw: Rotations of the objects about Wz, shape (n,), radians.
         mass: Shape (n,), kg; not used for fixed objects.
         movable: Shape (n,), False for objects fixed to the ground.
+        p_WG: The goal that the environment offers, shape (3,), metres; None where a goal may lie
+            anywhere.
     """
 
     category: str
@@ -31,6 +33,7 @@ class ClutterInstance:
     yaw: NDArray[np.float64]
     mass: NDArray[np.float64]
     movable: NDArray[np.bool_]
+    p_WG: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         n = len(self.shape)
@@ -44,6 +47,8 @@ class ClutterInstance:
             value = getattr(self, name)
             if value.shape != expected:
                 raise ValueError(f"{name} has shape {value.shape}, expected {expected}")
+        if self.p_WG is not None and self.p_WG.shape != (3,):
+            raise ValueError(f"p_WG has shape {self.p_WG.shape}, expected (3,)")
         unknown = set(self.shape) - set(SHAPES)
         if unknown:
             raise ValueError(f"unknown shapes {sorted(unknown)}; known: {SHAPES}")

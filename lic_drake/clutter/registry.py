@@ -6,6 +6,7 @@ import numpy as np
 
 from lic_drake.clutter.cylinder import CylinderClutter
 from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.clutter.passage import PassageClutter
 from lic_drake.errors import ScenarioError
 
 
@@ -42,3 +43,4 @@ def category_names() -> tuple[str, ...]:
 
 
 register_category("cylinder-clutter", CylinderClutter)
+register_category("passage-clutter", PassageClutter)

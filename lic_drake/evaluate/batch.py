@@ -25,13 +25,14 @@ def random_requests(
         scenario: What to simulate.
         stream: Seed stream of environments, goals and starts.
         environments: Number of environments, from index 0.
-        goals: Number of goals in each.
+        goals: Number of goals in each; of starts to its goal where an environment offers one.
     """
     starts = scenario.task.start_line.grid(scenario.arm())
     requests = []
     for environment in range(environments):
         for goal in range(goals):
-            p_WG = scenario.sample_goal(stream, environment, goal)
+            index = 0 if scenario.task.goal_area is None else goal
+            p_WG = scenario.sample_goal(stream, environment, index)
             rng = make_generator(stream, "rnd", environment, goal)
             x0 = starts[rng.integers(len(starts))]
             requests.append(make_request(scenario, stream, environment, p_WG, x0))

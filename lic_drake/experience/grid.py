@@ -69,9 +69,14 @@ class CollectionRequest:
         """Indices of the environments in their stream."""
         return range(self.first_environment, self.first_environment + self.environments)
 
-    def goals(self) -> NDArray[np.float64]:
-        """Returns the goals p_WG, shape (n, 3), metres."""
-        return _thin(self.scenario.task.goal_area.grid(), self.max_goals)
+    def goals(self, environment: int | None = None) -> NDArray[np.float64]:
+        """Returns the goals p_WG in an environment, shape (n, 3), metres; n is the same in all.
+
+        Args:
+            environment: Its index in the stream; the first one by default.
+        """
+        index = self.first_environment if environment is None else environment
+        return _thin(self.scenario.goals(self.stream, index), self.max_goals)
 
     def starts(self) -> NDArray[np.float64]:
         """Returns the start poses x0, shape (m, 3), metres and radians.
@@ -98,7 +103,7 @@ class CollectionRequest:
                 goal=goal,
                 start=start,
             )
-            for goal in _triples(self.goals())
+            for goal in _triples(self.goals(environment))
             for start in starts
         ]
 

@@ -65,10 +65,14 @@ class Environment:
             # Where something moved too far at once, the reach is repeated with all objects awake.
             with suppress(MovedTooFarError):
                 return simulate(self._waking, self.scenario, q0, p_WG, keep_states)
+        return simulate(self._all_awake(), self.scenario, q0, p_WG, keep_states)
+
+    def _all_awake(self) -> Simulation:
+        """Returns the simulation in which nothing sleeps, built when it is first needed."""
         if self._whole is None:
             diagram = make_reach_diagram(self.scenario, self.instance)
             self._whole = Simulation(diagram, self.scenario.scene)
-        return simulate(self._whole, self.scenario, q0, p_WG, keep_states)
+        return self._whole
 
 
 def simulate(

@@ -12,12 +12,13 @@ from typing import Any
 
 import numpy as np
 import yaml
+from numpy.typing import NDArray
 from pydrake.common.yaml import yaml_load_typed
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.clutter.registry import ClutterSampler, get_category
 from lic_drake.control.mpc_config import PRESETS, MpcConfig
-from lic_drake.errors import ScenarioError
+from lic_drake.errors import RequestError, ScenarioError
 from lic_drake.paths import scenarios_dir
 from lic_drake.reach.stop_rules import StopConfig
 from lic_drake.reach.task import Task
@@ -25,6 +26,8 @@ from lic_drake.robots.arm import Arm
 from lic_drake.robots.registry import get_robot
 from lic_drake.scene.scene import SceneConfig
 from lic_drake.seeds import make_generator
+
+Vector = NDArray[np.float64]
 
 
 @dataclass(kw_only=True)
@@ -53,9 +56,33 @@ class Scenario:
         """Draws the environment with this index in a seed stream."""
         return self.clutter.sample(make_generator(stream, self.category, environment))
 
-    def sample_goal(self, stream: str, environment: int, index: int = 0) -> np.ndarray:
-        """Draws the goal with this index for an environment, p_WG, shape (3,), metres."""
-        return self.task.goal_area.sample(make_generator(stream, "goal", environment, index))
+    def sample_goal(self, stream: str, environment: int, index: int = 0) -> Vector:
+        """Returns the goal with this index for an environment, p_WG, shape (3,), metres.
+
+        It is drawn from the goal area, or, without one, the goal that the environment offers.
+
+        Raises:
+            RequestError: The environment does not offer that many goals.
+        """
+        if self.task.goal_area is not None:
+            return self.task.goal_area.sample(make_generator(stream, "goal", environment, index))
+        goals = self.goals(stream, environment)
+        if index >= len(goals):
+            raise RequestError(
+                f"an environment of {self.category} offers {len(goals)} goal, {index + 1} were"
+                " asked for; take one goal in each of more environments"
+            )
+        return np.asarray(goals[index])
+
+    def goals(self, stream: str, environment: int) -> Vector:
+        """Returns the goals p_WG that a collection tries in an environment, shape (n, 3), metres.
+
+        They are the grid of the goal area, or, without one, the goal that the environment offers.
+        """
+        if self.task.goal_area is not None:
+            return self.task.goal_area.grid()
+        p_WG = self.sample_instance(stream, environment).p_WG
+        return np.empty((0, 3)) if p_WG is None else p_WG[np.newaxis]
 
 
 def to_dict(scenario: Scenario) -> dict[str, Any]:
@@ -111,7 +138,7 @@ def parse_scenario(content: str, overrides: str = "", source: str = "scenario") 
     preset = mpc.pop("preset", "haptic_mpc_2013")
     if not isinstance(preset, str) or preset not in PRESETS:
         raise ScenarioError(f"{source}: unknown mpc preset {preset!r}; choose {list(PRESETS)}")
-    return Scenario(
+    scenario = Scenario(
         category=data["category"],
         robot=data["robot"],
         clutter=_typed(sampler, data.get("clutter"), f"{source}: clutter"),
@@ -120,6 +147,12 @@ def parse_scenario(content: str, overrides: str = "", source: str = "scenario") 
         mpc=_typed(MpcConfig, mpc, f"{source}: mpc", defaults=PRESETS[preset]()),
         stop=_typed(StopConfig, data.get("stop"), f"{source}: stop"),
     )
+    if scenario.task.goal_area is None and len(scenario.goals("training", 0)) == 0:
+        raise ScenarioError(
+            f"{source}: task: goal_area cannot be null, because an environment of"
+            f" {scenario.category} offers no goal; give its lower and upper corner"
+        )
+    return scenario
 
 
 def _mapping(content: str, source: str) -> dict[str, Any]:

@@ -86,10 +86,11 @@ class GoalArea:
 
 @dataclass(kw_only=True)
 class Task:
-    """The start line and the goal area of a scenario."""
+    """The start line and the goals of a scenario."""
 
     start_line: StartLine = field(default_factory=StartLine)
-    goal_area: GoalArea = field(default_factory=GoalArea)
+    # None: the goal is the one that each environment offers (passage-clutter).
+    goal_area: GoalArea | None = field(default_factory=GoalArea)
 
 
 def _check_range(name: str, low: float, high: float, step: float) -> None:

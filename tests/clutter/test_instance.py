@@ -30,6 +30,13 @@ def test_arrays_of_another_length_are_refused(name: str) -> None:
         ClutterInstance(**values)
 
 
+def test_a_goal_is_a_point_in_space() -> None:
+    assert ClutterInstance(**arrays(1)).p_WG is None
+    assert ClutterInstance(**arrays(1), p_WG=np.zeros(3)).p_WG is not None
+    with pytest.raises(ValueError, match=r"p_WG has shape \(2,\), expected \(3,\)"):
+        ClutterInstance(**arrays(1), p_WG=np.zeros(2))
+
+
 def test_a_shape_that_the_scene_does_not_know_is_refused() -> None:
     with pytest.raises(ValueError, match=r"unknown shapes \['cone'\]"):
         ClutterInstance(**arrays(2) | {"shape": ("cone", "box")})

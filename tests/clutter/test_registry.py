@@ -7,6 +7,7 @@ import pytest
 from lic_drake.clutter import registry
 from lic_drake.clutter.cylinder import CylinderClutter
 from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.clutter.passage import PassageClutter
 from lic_drake.clutter.registry import category_names, get_category, register_category
 from lic_drake.errors import ScenarioError
 from lic_drake.reach.scenario import parse_scenario
@@ -36,9 +37,13 @@ def _restore(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     yield
 
 
-def test_cylinder_clutter_is_known() -> None:
-    assert get_category("cylinder-clutter") is CylinderClutter
-    assert "cylinder-clutter" in category_names()
+@pytest.mark.parametrize(
+    ("name", "sampler"),
+    [("cylinder-clutter", CylinderClutter), ("passage-clutter", PassageClutter)],
+)
+def test_the_papers_categories_are_known(name: str, sampler: type) -> None:
+    assert get_category(name) is sampler
+    assert name in category_names()
 
 
 def test_an_unknown_category_is_named_with_the_known_ones() -> None:

@@ -9,10 +9,11 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.patches import Circle, Polygon, Rectangle
 from reaches import free_space
-from worlds import ARM, box, cylinder, make_clutter
+from worlds import ARM, box, corners, cylinder, make_clutter
 
 from lic_drake.errors import LicError
 from lic_drake.evaluate.plots import ATTEMPT_COLORS, draw_density, draw_top_view, save_figure
+from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.scene.scene import FIXED_COLOR, MOVABLE_COLOR
 
@@ -111,6 +112,20 @@ def test_the_top_view_draws_every_object_where_it_stands(ax: Axes) -> None:
     np.testing.assert_allclose(corners.min(axis=0), [0.65, 0.0], atol=1e-9)
     np.testing.assert_allclose(corners.max(axis=0), [0.75, 0.2], atol=1e-9)
     assert rectangle.get_facecolor() == to_rgba(FIXED_COLOR)
+
+
+def test_the_top_view_draws_the_walls_of_a_passage_at_their_slope(ax: Axes) -> None:
+    scenario = load_scenario("passage-clutter")
+    instance = scenario.sample_instance("training", 0)
+    assert instance.p_WG is not None and instance.yaw[0] > 0.1
+    draw_top_view(ax, scenario, instance, instance.p_WG, [])
+    walls = [patch for patch in ax.patches if isinstance(patch, Rectangle)]
+    assert len(walls) == 2
+    for i, wall in enumerate(walls):
+        drawn = wall.get_patch_transform().transform([[0, 0], [1, 0], [1, 1], [0, 1]])
+        np.testing.assert_allclose(drawn, corners(instance, i), atol=1e-9)
+    (goal,) = [patch for patch in ax.patches if isinstance(patch, Circle)]
+    np.testing.assert_allclose(goal.center, instance.p_WO[:, :2].mean(axis=0))
 
 
 def test_the_top_view_draws_the_start_line_and_the_paths(ax: Axes) -> None:

@@ -22,6 +22,19 @@ def test_the_papers_library_has_18900_different_reaches() -> None:
     assert len({item.key for e in (0, 19) for item in request.reaches(e)}) == 2 * 945
 
 
+def test_the_papers_library_of_passages_has_1680_different_reaches() -> None:
+    scenario = load_scenario("passage-clutter")
+    request = CollectionRequest(scenario=scenario, environments=120)
+    assert (len(request.goals()), len(request.starts())) == (1, 14)
+    reaches = [item for environment in range(120) for item in request.reaches(environment)]
+    assert len({item.key for item in reaches}) == len(reaches) == 1680
+    # Each environment has a goal of its own, the one that trials there ask for.
+    goals = {(item.environment, item.goal) for item in reaches}
+    assert len({goal for _, goal in goals}) == len(goals) == 120
+    for environment, goal in goals:
+        assert goal == tuple(scenario.sample_goal("training", environment).tolist())
+
+
 def test_every_goal_is_tried_from_every_start() -> None:
     request = make_request(first_environment=5, stream="holdout")
     reaches = request.reaches(6)

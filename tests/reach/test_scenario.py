@@ -116,6 +116,8 @@ def test_an_mpc_preset_fills_what_the_file_leaves_open() -> None:
         ("{task: {start_line: {x_m: .nan}}}", "task: start line x_m must be a finite number"),
         ("{task: {goal_area: {step_m: 0}}}", "task: goal area x: needs finite numbers"),
         ("{task: {goal_area: {step_m: 1.0e-9}}}", "more than 1000 steps of 1e-09"),
+        ("{task: {goal_area: null}}", "task: goal_area cannot be null, because an environment of"),
+        ("{task: {goal_area: 3}}", "task: "),
         ("{category: jungle}", "unknown category 'jungle'; choose one of cylinder-clutter"),
         ("{category: [cylinder-clutter]}", "category must be a name, got ['cylinder-clutter']"),
         ("{robot: r2d2}", "unknown robot 'r2d2'; choose one of planar-arm"),

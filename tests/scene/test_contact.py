@@ -2,8 +2,10 @@ import numpy as np
 import pytest
 from pydrake.geometry import TriangleSurfaceMesh, VolumeMesh
 from pydrake.multibody.plant import CalcContactFrictionFromSurfaceProperties, ContactResults
-from worlds import ARM, World, box, cylinder, make_clutter, make_world
+from pydrake.systems.analysis import ApplySimulatorConfig, SimulatorConfig
+from worlds import ARM, World, box, cylinder, gap_to_boxes, make_clutter, make_world
 
+from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.scene.contact import ContactConfig, object_properties, skin_properties
 from lic_drake.scene.scene import SceneConfig
 
@@ -118,3 +120,60 @@ def test_the_arm_does_not_pass_through_a_fixed_object() -> None:
     R_RL, p_RL = ARM.link_poses(world.q)
     gap = (centre - p_RL[2]) @ R_RL[2, :, 0] - 0.025
     assert -1e-3 < gap < 0.0
+
+
+def wall_ahead(distance: float) -> ClutterInstance:
+    """A wall of a passage, 2 cm thick, across the way of the hand and in front of its tip."""
+    along = -ARM.link_poses(BENT)[0][2, :, 1]
+    centre = ARM.tip_position(BENT) + (distance + 0.01) * along
+    return box(*centre[:2], (0.02, 0.4, 0.2), yaw=float(np.arctan2(along[1], along[0])))
+
+
+def test_a_tip_on_a_wall_is_about_as_stiff_as_the_authors_contact_spring() -> None:
+    force = []
+    for depth in (1.0e-4, 2.0e-4):
+        results = contact_results(make_world(BENT, make_clutter(wall_ahead(-depth)), SceneConfig()))
+        assert results.num_hydroelastic_contacts() == 1
+        info = results.hydroelastic_contact_info(0)
+        force.append(np.linalg.norm(info.F_Ac_W().translational()))
+    assert force[0] > 0.5
+    assert (force[1] - force[0]) / 1.0e-4 == pytest.approx(4.8e4, rel=0.5)
+
+
+@pytest.mark.parametrize("time_step", [0.0, 0.005])
+@pytest.mark.parametrize("speed", [0.0, 1.0])
+def test_a_thin_wall_stops_the_arm_and_bears_what_the_joints_press_with(
+    speed: float, time_step: float
+) -> None:
+    # In a reach nothing moves faster than 0.3 m/s.
+    along = -ARM.link_poses(BENT)[0][2, :, 1]
+    clutter = make_clutter(wall_ahead(0.02))
+    world = make_world(BENT, clutter, SceneConfig(time_step_s=time_step))
+    if time_step == 0.0:
+        ApplySimulatorConfig(
+            SimulatorConfig(integration_scheme="cenic", accuracy=1e-4, max_step_size=0.01),
+            world.simulator,
+        )
+    to_joints = np.linalg.pinv(ARM.tip_jacobian(BENT)) @ along
+    q_d = BENT + 0.1 * to_joints
+    world.set_equilibrium(q_d)
+    plant = world.scene.plant
+    plant.SetVelocities(world.plant_context, world.scene.arm, speed * to_joints)
+    deepest = 0.0
+    for _ in range(400):
+        world.advance(0.01)
+        deepest = min(deepest, gap_to_boxes(world.q, clutter))
+    assert -2e-3 < deepest < 0.0
+    assert -5e-4 < gap_to_boxes(world.q, clutter) < 0.0
+    results = contact_results(world)
+    assert results.num_hydroelastic_contacts() == 1
+    info = results.hydroelastic_contact_info(0)
+    # The force at the contact that holds the joints against their stiffness and damping. Only its
+    # normal part is compared: the tip creeps, and CENIC reports friction by another model.
+    v = plant.GetVelocities(world.plant_context, world.scene.arm)
+    torque = ARM.stiffness * (q_d - world.q) - ARM.damping * v
+    p_WC = np.array([info.contact_surface().centroid()])
+    (jacobian,) = ARM.point_jacobians(world.q, np.array([2]), p_WC)
+    expected = np.linalg.pinv(jacobian.T) @ torque @ along
+    assert expected > 10.0
+    assert abs(info.F_Ac_W().translational() @ along) == pytest.approx(expected, rel=0.01)

@@ -1,0 +1,67 @@
+"""passage-clutter: a narrow passage between two fixed walls (paper IV-A, Fig. 3b)."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.errors import ScenarioError
+
+
+@dataclass(kw_only=True)
+class PassageClutter:
+    """Parameters of the category; the goal of an environment is the centre of its passage.
+
+    Sizes are the paper's. It does not state the distance of the passages, nor their directions:
+    `models/scenarios/passage-clutter.yaml` says how those were chosen.
+    """
+
+    # Clear distance between the walls, and their length and width, metres (paper IV-A); their
+    # height from the authors' simulator.
+    gap_m: float = 0.1
+    wall_length_m: float = 0.4
+    wall_width_m: float = 0.02
+    wall_height_m: float = 0.2
+    # Ends of the segment on which the passage's centre lies, (x, y) in W, metres: 0.4 m long,
+    # "horizontal" (paper IV-A), that is along y, as the paper calls +x "vertical" (Fig. 6).
+    centre_from: list[float] = field(default_factory=lambda: [0.695, -0.2])
+    centre_to: list[float] = field(default_factory=lambda: [0.695, 0.2])
+    # Range of the walls' direction, degrees from +x to the left, at most 90 to either side.
+    min_slope_deg: float = 5.0
+    max_slope_deg: float = 35.0
+
+    def __post_init__(self) -> None:
+        for name in ("gap_m", "wall_length_m", "wall_width_m", "wall_height_m"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0):
+                raise ScenarioError(f"{name} must be a positive number, got {value}")
+        if not len(self.centre_from) == len(self.centre_to) == 2 or not np.all(
+            np.isfinite([*self.centre_from, *self.centre_to])
+        ):
+            raise ScenarioError(
+                f"centre_from and centre_to must be [x, y] in metres, got {self.centre_from},"
+                f" {self.centre_to}"
+            )
+        if not -90.0 <= self.min_slope_deg <= self.max_slope_deg <= 90.0:
+            raise ScenarioError(
+                "slopes need -90 <= min_slope_deg <= max_slope_deg <= 90, got"
+                f" {self.min_slope_deg} and {self.max_slope_deg}"
+            )
+
+    def sample(self, rng: np.random.Generator) -> ClutterInstance:
+        """Draws one environment: centre and slope uniform, the walls parallel to each other."""
+        begin, end = np.array(self.centre_from), np.array(self.centre_to)
+        centre = begin + rng.uniform() * (end - begin)
+        slope = np.deg2rad(rng.uniform(self.min_slope_deg, self.max_slope_deg))
+        # From the centre to the centre line of the wall on the left.
+        to_wall = 0.5 * (self.gap_m + self.wall_width_m) * np.array([-np.sin(slope), np.cos(slope)])
+        return ClutterInstance(
+            category="passage-clutter",
+            shape=("box", "box"),
+            size=np.tile([self.wall_length_m, self.wall_width_m, self.wall_height_m], (2, 1)),
+            p_WO=np.column_stack([[centre + to_wall, centre - to_wall], np.zeros(2)]),
+            yaw=np.full(2, slope),
+            mass=np.ones(2),
+            movable=np.zeros(2, dtype=bool),
+            p_WG=np.append(centre, 0.0),
+        )

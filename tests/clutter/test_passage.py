@@ -1,0 +1,113 @@
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import kstest
+from worlds import corners
+
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.clutter.passage import PassageClutter
+from lic_drake.errors import ScenarioError
+from lic_drake.seeds import make_generator
+
+
+def sample(passage: PassageClutter, index: int = 0, stream: str = "training") -> ClutterInstance:
+    return passage.sample(make_generator(stream, "passage-clutter", index))
+
+
+def test_the_defaults_are_the_papers_passage() -> None:
+    passage = PassageClutter()
+    instance = sample(passage)
+    assert instance.shape == ("box", "box")
+    assert not instance.movable.any()
+    np.testing.assert_array_equal(instance.size[:, :2], [[0.4, 0.02], [0.4, 0.02]])
+    assert passage.gap_m == 0.1
+    assert np.linalg.norm(np.subtract(passage.centre_to, passage.centre_from)) == 0.4
+
+
+POINTS = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)).map(list)
+SLOPES = st.tuples(st.floats(-90.0, 90.0), st.floats(-90.0, 90.0)).map(sorted)
+
+
+@given(
+    st.floats(1e-3, 0.5),
+    st.floats(1e-2, 1.0),
+    st.floats(1e-3, 0.1),
+    POINTS,
+    POINTS,
+    SLOPES,
+    st.integers(0, 2**32 - 1),
+)
+def test_whatever_the_slope_the_gap_is_exact_and_the_goal_in_its_middle(
+    gap: float,
+    length: float,
+    width: float,
+    begin: list[float],
+    end: list[float],
+    slopes: list[float],
+    index: int,
+) -> None:
+    passage = PassageClutter(
+        gap_m=gap,
+        wall_length_m=length,
+        wall_width_m=width,
+        centre_from=begin,
+        centre_to=end,
+        min_slope_deg=slopes[0],
+        max_slope_deg=slopes[1],
+    )
+    instance = sample(passage, index)
+    # On the segment: the ways to both ends add up to its length.
+    assert instance.p_WG is not None and instance.p_WG[2] == 0.0
+    ways = np.linalg.norm(instance.p_WG[:2] - np.array([begin, end]), axis=1)
+    assert ways.sum() == pytest.approx(np.linalg.norm(np.subtract(end, begin)), abs=1e-9)
+    yaw = instance.yaw[0]
+    assert slopes[0] - 1e-9 <= np.rad2deg(yaw) <= slopes[1] + 1e-9
+    # Seen from the goal along the passage and across it.
+    along, across = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
+    left, right = (corners(instance, i) - instance.p_WG[:2] for i in (0, 1))
+    for wall in (left, right):
+        assert np.ptp(wall @ along) == pytest.approx(length)
+        assert np.ptp(wall @ across) == pytest.approx(width)
+        assert (wall @ along).min() == pytest.approx(-0.5 * length)
+    assert (left @ across).min() == pytest.approx(0.5 * gap)
+    assert (right @ across).max() == pytest.approx(-0.5 * gap)
+
+
+def test_an_index_always_gives_the_same_passage_and_another_one_gives_another() -> None:
+    passage = PassageClutter()
+    np.testing.assert_array_equal(sample(passage, 3).p_WO, sample(passage, 3).p_WO)
+    others = [sample(passage, 4), sample(passage, 3, "evaluation")]
+    assert all(np.all(sample(passage, 3).yaw != other.yaw) for other in others)
+
+
+def test_centres_and_slopes_are_uniform_and_independent() -> None:
+    passage = PassageClutter()
+    drawn = [sample(passage, index) for index in range(2000)]
+    y = np.array([instance.p_WG[1] for instance in drawn if instance.p_WG is not None])
+    slope = np.rad2deg([instance.yaw[0] for instance in drawn])
+    slopes = passage.max_slope_deg - passage.min_slope_deg
+    assert kstest((y - passage.centre_from[1]) / 0.4, "uniform").pvalue > 1e-3
+    assert kstest((slope - passage.min_slope_deg) / slopes, "uniform").pvalue > 1e-3
+    assert abs(np.corrcoef(y, slope)[0, 1]) < 0.09  # 4 standard deviations
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"gap_m": 0.0}, "gap_m must be a positive number, got 0.0"),
+        ({"wall_length_m": -0.4}, "wall_length_m must be a positive number, got -0.4"),
+        ({"wall_width_m": float("nan")}, "wall_width_m must be a positive number, got nan"),
+        ({"wall_height_m": float("inf")}, "wall_height_m must be a positive number, got inf"),
+        ({"centre_from": [0.6]}, r"must be \[x, y\] in metres, got \[0.6\]"),
+        ({"centre_to": [0.6, float("inf")]}, r"must be \[x, y\] in metres.*inf"),
+        ({"min_slope_deg": 40.0}, "min_slope_deg <= max_slope_deg <= 90, got 40.0 and 35.0"),
+        ({"max_slope_deg": 91.0}, "got 5.0 and 91.0"),
+        ({"max_slope_deg": float("nan")}, "got 5.0 and nan"),
+    ],
+)
+def test_a_value_that_cannot_be_used_is_named(values: dict[str, Any], message: str) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        PassageClutter(**values)
