@@ -3,7 +3,6 @@
 import dataclasses
 import json
 from pathlib import Path
-from types import TracebackType
 from typing import Any, BinaryIO, Self
 
 from lic_drake.experience.files import open_locked, readable_errors
@@ -49,12 +48,7 @@ class Journal:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *exception: object) -> None:
         self._file.close()
 
     def append(self, record: ReachRecord) -> None:
