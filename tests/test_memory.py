@@ -25,7 +25,8 @@ from lic_drake.evaluate.batch import random_requests
 from lic_drake.reach import recording, rollout, waking
 from lic_drake.reach.diagram import ReachDiagram, make_reach_diagram
 from lic_drake.reach.recording import ReachRecording
-from lic_drake.reach.rollout import Environment, run_reach
+from lic_drake.reach.environment import Environment
+from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import load_scenario
 
 pytestmark = pytest.mark.skipif(
@@ -44,11 +45,11 @@ def built(monkeypatch: pytest.MonkeyPatch) -> Iterator[list["weakref.ref[Any]"]]
         references.extend(weakref.ref(item) for item in (reach_diagram.diagram, *systems))
         return reach_diagram
 
-    rollout._recent.clear()
+    rollout._environments.clear()
     for module in (rollout, recording, waking):
         monkeypatch.setattr(module, "make_reach_diagram", make)
     yield references
-    rollout._recent.clear()
+    rollout._environments.clear()
 
 
 def alive(references: list["weakref.ref[Any]"]) -> list[str]:
@@ -64,7 +65,7 @@ def test_only_the_diagram_of_the_last_environment_stays(built: list["weakref.ref
         run_reach(reach_request(small_clutter(0.2), environment=environment))
     assert len(built) == 5 * len(ONE_DIAGRAM)
     assert alive(built) == ONE_DIAGRAM
-    rollout._recent.clear()
+    rollout._environments.clear()
     assert alive(built) == []
 
 
@@ -94,7 +95,7 @@ def test_failures_and_invalid_starts_leave_nothing(
     ]
     outcomes = [run_reach(request).outcome for request in requests]
     assert outcomes == ["diverged", "invalid_start", "unreachable"]
-    rollout._recent.clear()
+    rollout._environments.clear()
     assert alive(built) == []
 
 

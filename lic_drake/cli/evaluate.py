@@ -14,7 +14,9 @@ def add_parser(subparsers: Subparsers) -> None:
         help="compare selection strategies on unseen environments",
         description="Runs every strategy on the same random goals in the same environments, none"
         " of them in a library, and prints success rates with Wilson 90 % intervals and"
-        " McNemar's paired test against RND. Run again, it goes on where it was.",
+        " McNemar's paired test against RND. A second attempt finds the environment as the first"
+        " one left it. Writes trials.parquet, a row for each attempt, and their reaches. Run"
+        " again, it goes on where it was.",
         epilog="example: lic evaluate out/evaluation --environments 50 --methods rnd gp",
     )
     parser.add_argument(
@@ -25,12 +27,13 @@ def add_parser(subparsers: Subparsers) -> None:
         nargs="+",
         default=["rnd", "cost", "gp", "knn"],
         metavar="NAME",
-        help="strategies to compare (default: rnd cost gp knn)",
+        help="strategies to compare: rnd, cost, gp, knn; gp1 uses LIC-1 for all attempts, gp>cost"
+        " LIC-1 for the first one and COST for later ones (default: rnd cost gp knn)",
     )
     for name, default, text in (
         ("--environments", 200, "number of environments"),
         ("--goals", 1, "goals in each"),
-        ("--attempts", 1, "attempts at a goal at the most"),
+        ("--attempts", 2, "attempts at a goal at the most"),
         ("--workers", os.cpu_count() or 1, "number of processes; the default is one a core"),
     ):
         parser.add_argument(
@@ -40,26 +43,39 @@ def add_parser(subparsers: Subparsers) -> None:
             metavar="N",
             help=f"{text} (default: %(default)s)",
         )
+    parser.add_argument(
+        "--fresh",
+        action="store_true",
+        help="let later attempts find the environment as it was drawn (default: as the attempt"
+        " before left it)",
+    )
+    parser.add_argument(
+        "--variant",
+        default="",
+        metavar="NAME",
+        help="name of these trials beside others in the same folder (default: none)",
+    )
     add_library_argument(parser)
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Runs the subcommand and returns the exit code."""
-    from lic_drake.evaluate.experiment import format_rates, run_trials, summarize_trials
-    from lic_drake.experience.store import ExperienceLibrary
+    from lic_drake.evaluate.experiment import Evaluation, run_evaluation
+    from lic_drake.evaluate.rates import format_rates, summarize_trials
+    from lic_drake.evaluate.trials import TrialTable
     from lic_drake.paths import shipped_library
 
-    library = ExperienceLibrary(args.library or shipped_library("cylinder-clutter"))
-    trials = run_trials(
-        library.scenario(),
-        library,
-        args.results,
-        args.methods,
-        args.environments,
-        args.goals,
-        args.attempts,
-        args.workers,
+    evaluation = Evaluation(
+        experience=args.library or shipped_library("cylinder-clutter"),
+        results=args.results,
+        methods=tuple(args.methods),
+        environments=args.environments,
+        goals=args.goals,
+        attempts=args.attempts,
+        fresh=args.fresh,
+        variant=args.variant,
     )
-    print(format_rates(summarize_trials(trials, args.attempts)), end="")
+    table = TrialTable(run_evaluation(evaluation, args.workers))
+    print(format_rates(summarize_trials(table, args.attempts, args.variant)), end="")
     return 0

@@ -141,15 +141,10 @@ def _record(request: "ReachRequest", path: Path) -> None:
     import numpy as np
 
     from lic_drake.reach.recording import ReachRecording
+    from lic_drake.reach.rollout import instance_of, simulate_request
 
-    scenario = request.scenario
-    x0 = np.array(request.start)
-    if scenario.arm().solve_ik(x0) is None:
-        return
-    recording = ReachRecording(
-        scenario, scenario.sample_instance(request.stream, request.environment)
-    )
-    recording.add_reach(x0, np.array(request.goal))
+    recording = ReachRecording(request.scenario, instance_of(request))
+    recording.add_reach(simulate_request(request, keep_states=True).trace, np.array(request.goal))
     recording.save(path)
 
 

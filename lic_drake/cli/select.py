@@ -57,8 +57,9 @@ def run(args: argparse.Namespace) -> int:
     from lic_drake.experience.store import ExperienceLibrary
     from lic_drake.paths import shipped_library
     from lic_drake.reach.request import check_goal
+    from lic_drake.reach.starts import make_starts
     from lic_drake.select.registry import make_selector, needs_library
-    from lic_drake.select.situation import Situation, StartSet
+    from lic_drake.select.situation import FailedReach, Situation
 
     needs_library(args.method)
     library = ExperienceLibrary(args.library or shipped_library("cylinder-clutter"))
@@ -66,10 +67,14 @@ def run(args: argparse.Namespace) -> int:
     p_WG = np.array([*args.goal, 0.0])
     check_goal(scenario, p_WG)
     arm = planar_arm_of(scenario)
-    starts = StartSet(arm=arm, line=scenario.task.start_line)
-    failed = tuple(np.array([starts.line.x_m, y, np.deg2rad(phi)]) for y, phi in args.failed)
+    starts = make_starts(scenario, scenario.sample_instance("evaluation", args.seed))
+    failed = tuple(
+        FailedReach.from_start(np.array([scenario.task.start_line.x_m, y, np.deg2rad(phi)]))
+        for y, phi in args.failed
+    )
     situation = Situation(p_WG=p_WG, starts=starts, failed=failed)
-    selector = make_selector(args.method, arm, library.columns(), np.random.default_rng(args.seed))
+    rng = np.random.default_rng(args.seed)
+    selector = make_selector(args.method, arm, library.columns(), rng, scenario.category)
     chosen = selector.select(situation)
     if args.json:
         print(

@@ -1,6 +1,6 @@
 """`ClutterInstance`: one drawn environment as plain arrays."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,8 @@ class ClutterInstance:
         movable: Shape (n,), False for objects fixed to the ground.
         p_WG: The goal that the environment offers, shape (3,), metres; None where a goal may lie
             anywhere.
+        p_WA: Centres of the apertures through which a robot may reach, shape (k, 3), metres; None
+            where the front is open.
     """
 
     category: str
@@ -34,6 +36,7 @@ class ClutterInstance:
     mass: NDArray[np.float64]
     movable: NDArray[np.bool_]
     p_WG: NDArray[np.float64] | None = None
+    p_WA: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         n = len(self.shape)
@@ -49,6 +52,8 @@ class ClutterInstance:
                 raise ValueError(f"{name} has shape {value.shape}, expected {expected}")
         if self.p_WG is not None and self.p_WG.shape != (3,):
             raise ValueError(f"p_WG has shape {self.p_WG.shape}, expected (3,)")
+        if self.p_WA is not None and self.p_WA.shape[1:] != (3,):
+            raise ValueError(f"p_WA has shape {self.p_WA.shape}, expected (k, 3)")
         unknown = set(self.shape) - set(SHAPES)
         if unknown:
             raise ValueError(f"unknown shapes {sorted(unknown)}; known: {SHAPES}")
@@ -57,3 +62,22 @@ class ClutterInstance:
     def num_objects(self) -> int:
         """Number of objects, fixed and movable."""
         return len(self.shape)
+
+    def translated(self, offset: NDArray[np.float64]) -> "ClutterInstance":
+        """Returns the same environment moved by an offset, shape (3,), metres."""
+        return replace(
+            self,
+            p_WO=self.p_WO + offset,
+            p_WG=None if self.p_WG is None else self.p_WG + offset,
+            p_WA=None if self.p_WA is None else self.p_WA + offset,
+        )
+
+    def with_objects_at(self, p_WO: NDArray[np.float64]) -> "ClutterInstance":
+        """Returns the environment with its movable objects elsewhere.
+
+        Args:
+            p_WO: Their positions in the plane, shape (movable objects, 2), metres.
+        """
+        moved = self.p_WO.copy()
+        moved[self.movable, :2] = p_WO
+        return replace(self, p_WO=moved)

@@ -4,6 +4,7 @@ from typing import Protocol
 
 import numpy as np
 
+from lic_drake.clutter.aperture import CylinderApertureClutter
 from lic_drake.clutter.cylinder import CylinderClutter
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.clutter.passage import PassageClutter
@@ -44,3 +45,4 @@ def category_names() -> tuple[str, ...]:
 
 register_category("cylinder-clutter", CylinderClutter)
 register_category("passage-clutter", PassageClutter)
+register_category("cylinder-aperture-clutter", CylinderApertureClutter)

@@ -1,18 +1,22 @@
-"""Gaussian weights of nearest neighbours, and how wide they should be."""
+"""Gaussian weights of nearest neighbours, and how wide they should be along each feature."""
+
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
-from lic_drake.estimate.checks import Vector
+from lic_drake.estimate.averaging import AveragedRows
+from lic_drake.estimate.checks import Vector, feature_scale
 from lic_drake.seeds import make_generator
 
-_MAX_POINTS = 2000
-_NUM_CANDIDATES = 16
-# A neighbour at this many bandwidths weighs 1/23 of one at hand: where the set of neighbours
-# changes, the estimate then jumps by little.
-_TRUNCATION = 2.5
+_MAX_POINTS = 500
+# Bandwidths in standard deviations of their feature: from nearest neighbours only to a feature
+# that tells nothing.
+_SMALLEST, _LARGEST = 0.02, 8.0
+_COMMON = np.geomspace(0.1, 1.6, 9)
+_STEPS = (2.0, 2.0, np.sqrt(2.0))
 
 
 def query_neighbours(
@@ -29,58 +33,92 @@ def query_neighbours(
     return distance, index
 
 
-def gaussian_weights(distance: Vector, bandwidth: float) -> Vector:
-    """Returns exp(-d^2 / (2 h^2)) relative to the nearest, so that not all of them underflow.
+def gaussian_weights(distance: Vector) -> Vector:
+    """Returns exp(-d^2 / 2) relative to the nearest, so that not all of them underflow.
 
     Args:
-        distance: Distances d, shape (..., k), the nearest first.
-        bandwidth: h, in the same unit.
+        distance: Distances d in bandwidths, shape (..., k), the nearest first.
     """
     nearest = distance[..., :1]
-    weights: Vector = np.exp(-0.5 * (distance**2 - nearest**2) / bandwidth**2)
+    weights: Vector = np.exp(-0.5 * (distance**2 - nearest**2))
     return weights
 
 
-def select_bandwidth(
-    tree: cKDTree, neighbours: int, point: NDArray[np.intp], f: Vector, fold: NDArray[np.intp]
-) -> float:
-    """Returns the bandwidth with the least squared error in folds that were held out.
+def select_bandwidths(
+    rows: AveragedRows, neighbours: int, f: Vector, fold: NDArray[np.intp]
+) -> Vector:
+    """Returns the bandwidth of each feature, shape (d,), by search along one after the other.
+
+    Sought is the least squared error in folds that were held out, at 500 points at most. Where
+    features matter differently, as a start's orientation and a goal's distance do, a common
+    bandwidth in standard deviations averages too much along one and too little along the other.
 
     Args:
-        tree: The distinct points; at most 2,000 of them are tried.
+        rows: The distinct points.
         neighbours: Number of points averaged.
-        point: Point of each reach, shape (n,).
         f: Success of each reach, shape (n,).
         fold: Fold of each reach, shape (n,).
     """
-    if min(neighbours, tree.n) == 1:
-        return 1.0  # a single neighbour weighs the same at any bandwidth
-    tries, successes = _count_by_fold(tree.n, point, f, fold)
+    scale = feature_scale(rows.Z)
+    if min(neighbours, len(rows.Z)) == 1:
+        return scale  # a single neighbour weighs the same at any bandwidth
+    error = _held_out_error(rows, neighbours, f, fold)
+    common = float(min(_COMMON, key=lambda factor: error(factor * scale)))
+    return _improve(error, common * scale, scale, np.ptp(rows.Z, axis=0) > 0.0)
+
+
+def _improve(
+    error: Callable[[Vector], float],
+    bandwidth: Vector,
+    scale: Vector,
+    varies: NDArray[np.bool_],
+) -> Vector:
+    """Returns bandwidths after a search along each varying feature, with shrinking steps."""
+    least = error(bandwidth)
+    for step in _STEPS:
+        for feature in np.flatnonzero(varies):
+            for factor in (step, 1.0 / step):
+                while True:
+                    other = bandwidth.copy()
+                    other[feature] *= factor
+                    inside = _SMALLEST < other[feature] / scale[feature] < _LARGEST
+                    if not inside or (found := error(other)) >= least:
+                        break
+                    bandwidth, least = other, found
+    return bandwidth
+
+
+def _held_out_error(
+    rows: AveragedRows, neighbours: int, f: Vector, fold: NDArray[np.intp]
+) -> Callable[[Vector], float]:
+    """Returns the squared error as a function of the bandwidths."""
+    tries, successes = _count_by_fold(len(rows.Z), rows.member, f, fold)
     # What each fold is predicted from: everything but itself.
     seen_tries = tries.sum(axis=1, keepdims=True) - tries
     seen_successes = successes.sum(axis=1, keepdims=True) - successes
     rate = seen_successes.sum() / seen_tries.sum()
-
     rng = make_generator("training", "points for the choice of a bandwidth")
-    tried = rng.permutation(tree.n)[:_MAX_POINTS]
-    distance, index = query_neighbours(tree, tree.data[tried], neighbours)
-    row_starts = np.arange(0, index.size + 1, index.shape[1])
-    smallest = 0.5 * float(np.median(distance[:, 1]))
-    largest = max(smallest, float(np.median(distance[:, -1])) / _TRUNCATION)
+    tried = rng.permutation(len(rows.Z))[:_MAX_POINTS]
+    misses, hits = tries[tried] - successes[tried], successes[tried]
 
-    def error(bandwidth: float) -> float:
+    def error(bandwidth: Vector) -> float:
+        points = rows.Z / bandwidth
+        distance, index = query_neighbours(cKDTree(points), points[tried], neighbours)
         weight = csr_array(
-            (gaussian_weights(distance, bandwidth).ravel(), index.ravel(), row_starts),
-            shape=(len(tried), tree.n),
+            (
+                gaussian_weights(distance).ravel(),
+                index.ravel(),
+                np.arange(0, index.size + 1, index.shape[1]),
+            ),
+            shape=(len(tried), len(points)),
         )
         total = weight @ seen_tries
         # Where a fold holds all neighbours, the rate of the other folds is all there is.
         known = total > 0.0
         predicted = np.where(known, weight @ seen_successes / np.where(known, total, 1.0), rate)
-        hits = successes[tried]
-        return float(np.sum(hits * (1.0 - predicted) ** 2 + (tries[tried] - hits) * predicted**2))
+        return float(np.sum(hits * (1.0 - predicted) ** 2 + misses * predicted**2))
 
-    return float(min(np.geomspace(smallest, largest, _NUM_CANDIDATES), key=error))
+    return error
 
 
 def _count_by_fold(

@@ -48,13 +48,24 @@ class Predictor(Protocol):
 
 
 class SuccessEstimator(Predictor, Protocol):
-    """F(s, x0) of paper III-D with its gradient, for the optimisation of Eq. (4)."""
+    """F(s, x0) of paper III-D with its gradient, for the optimisation of Eq. (4).
+
+    Estimates are not clipped into [0, 1] here: a clipped one is flat where an optimiser needs to
+    climb, and would tie the best starts with each other.
+    """
+
+    def values(self, Z: ArrayLike) -> Vector:
+        """Returns the estimates for queries Z, shape (n, d): shape (n,).
+
+        Many at a time: candidates of one situation take a few milliseconds in all.
+
+        Raises:
+            EstimateError: Not fitted yet, or queries that do not fit.
+        """
+        ...
 
     def value_and_gradient(self, z: ArrayLike) -> tuple[float, Vector]:
         """Returns the estimate at z, shape (d,), and its gradient by z, shape (d,).
-
-        The value is not clipped into [0, 1]: a clipped one is flat where an optimiser needs
-        to climb, and would tie the best starts with each other.
 
         Raises:
             EstimateError: Not fitted yet, or a query that does not fit.

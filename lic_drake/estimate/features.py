@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lic_drake.estimate.checks import EstimateError, Vector
+from lic_drake.experience.second_reach import FIRST_PREFIX, SHOWN
 
 _GOAL = ("goal_x", "goal_y", "goal_z")
 _START = ("start_x", "start_y", "start_phi")
+_OBSERVED = tuple(FIRST_PREFIX + name for name in SHOWN)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,18 +34,30 @@ class ExperienceRows:
 class FeatureMap:
     """Which columns of the records make up z: first the situation, then the decision.
 
+    Positions are those in the robot's frame R, which has the axes of the world W and its origin
+    at the base: the translation T_b0 of paper Eq. (3). Angles and velocities are the same in both.
+
     Attributes:
         goal: Columns of the goal p_WG, a part of goal_x, goal_y, goal_z, metres.
         start: Columns of the initial condition x0 that the robot chooses, a part of start_x,
             start_y, start_phi, metres and radians.
+        observed: Columns of what the first reach showed, for LIC-2: a part of first_start_x,
+            first_start_y, first_start_phi, first_final_x, first_final_y, first_final_phi,
+            first_final_vx, first_final_vy, metres, radians and m/s.
     """
 
     goal: tuple[str, ...]
     start: tuple[str, ...]
+    observed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for kind, names, known in (("goal", self.goal, _GOAL), ("start", self.start, _START)):
-            if not names or not set(names) <= set(known) or len(set(names)) < len(names):
+        for kind, names, known in (
+            ("goal", self.goal, _GOAL),
+            ("start", self.start, _START),
+            ("observed", self.observed, _OBSERVED),
+        ):
+            needed = kind != "observed" and not names
+            if needed or not set(names) <= set(known) or len(set(names)) < len(names):
                 raise EstimateError(
                     f"{kind} features must be some of {', '.join(known)}, each once, got {names}"
                 )
@@ -51,17 +65,17 @@ class FeatureMap:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the d features, in the order of z."""
-        return self.goal + self.start
+        return self.goal + self.observed + self.start
 
     @property
     def situation(self) -> slice:
         """The part of z that is given."""
-        return slice(0, len(self.goal))
+        return slice(0, len(self.goal) + len(self.observed))
 
     @property
     def decision(self) -> slice:
         """The part of z that the robot chooses."""
-        return slice(len(self.goal), len(self.names))
+        return slice(self.situation.stop, len(self.names))
 
     def rows(self, columns: Mapping[str, NDArray[Any]]) -> ExperienceRows:
         """Returns the rows of a library.
@@ -70,7 +84,9 @@ class FeatureMap:
         failure, as it is when a selected start is evaluated.
 
         Args:
-            columns: Arrays of equal length named as the fields of `ReachRecord`.
+            columns: Arrays of equal length named as the fields of `ReachRecord`; with observed
+                features those of `lic_drake.experience.second_reach.pair_reaches`. Without
+                base_x and base_y the base stands at the origin.
 
         Raises:
             EstimateError: A column is missing.
@@ -84,22 +100,62 @@ class FeatureMap:
         # Environments of different streams share indices.
         streams, stream = np.unique(columns["stream"].astype(str), return_inverse=True)
         environment = columns["environment"].astype(np.int64) * len(streams) + stream
+        origin = np.zeros(len(environment))
+        base = np.column_stack([columns.get(name, origin) for name in ("base_x", "base_y")])
+        Z = np.column_stack([np.asarray(columns[name], dtype=float) for name in self.names])
         return ExperienceRows(
-            Z=np.column_stack([np.asarray(columns[name], dtype=float) for name in self.names]),
+            Z=Z - base @ self._base_selection(self.names).T,
             f=np.asarray(columns["success"], dtype=float),
             environment=environment,
         )
 
-    def join(self, p_WG: ArrayLike, x0: ArrayLike) -> Vector:
+    def join(self, p_RG: ArrayLike, x0: ArrayLike, observed: ArrayLike | None = None) -> Vector:
         """Returns z, shape (..., d).
 
         Args:
-            p_WG: Goal, shape (..., 3), metres.
-            x0: Initial condition (x, y, phi), shape (..., 3), metres and radians.
+            p_RG: Goal in the robot's frame, shape (..., 3), metres.
+            x0: Initial condition (x, y, phi) in it, shape (..., 3), metres and radians.
+            observed: The observed features in it, shape (..., k), see `observation`; by default
+                there are none.
+
+        Raises:
+            EstimateError: Another number of observed features than the map has.
         """
-        p_WG, x0 = np.broadcast_arrays(np.asarray(p_WG, dtype=float), np.asarray(x0, dtype=float))
-        goal = p_WG[..., [_GOAL.index(name) for name in self.goal]]
-        return np.concatenate([goal, x0[..., self._start_indices()]], axis=-1)
+        p_RG, x0 = np.asarray(p_RG, dtype=float), np.asarray(x0, dtype=float)
+        seen = np.zeros(0) if observed is None else np.asarray(observed, dtype=float)
+        if seen.shape[-1:] != (len(self.observed),):
+            raise EstimateError(
+                f"z needs {len(self.observed)} observed features, got shape {seen.shape}"
+            )
+        goal = p_RG[..., [_GOAL.index(name) for name in self.goal]]
+        start = x0[..., self._start_indices()]
+        shape = np.broadcast_shapes(goal.shape[:-1], seen.shape[:-1], start.shape[:-1])
+        parts = [np.broadcast_to(part, shape + part.shape[-1:]) for part in (goal, seen, start)]
+        return np.concatenate(parts, axis=-1)
+
+    def observation(self, first: Mapping[str, float], base: ArrayLike = (0.0, 0.0)) -> Vector:
+        """Returns the observed features in the frame of a robot about to make its second reach.
+
+        Args:
+            first: What the first reach showed, in W: start_x, start_y, start_phi, final_x,
+                final_y, final_phi, final_vx, final_vy, metres, radians and m/s.
+            base: Position p_WR of the base in the second reach, shape (2,), metres.
+
+        Returns:
+            Shape (k,), in the order of `observed`.
+
+        Raises:
+            EstimateError: A value is missing or not finite: the first reach never began.
+        """
+        seen = [first.get(name.removeprefix(FIRST_PREFIX), np.nan) for name in self.observed]
+        if not np.all(np.isfinite(seen)):
+            raise EstimateError(
+                f"the first reach shows no {self.observed[np.argmin(np.isfinite(seen))]}, as if it"
+                " never began; choose the second start as a first one"
+            )
+        moved = self._base_selection(self.observed) @ np.asarray(base, dtype=float)
+        observed: Vector = np.array(seen) - moved
+        return observed
 
     def gradient_by_x0(self, gradient: Vector) -> Vector:
         """Returns a gradient by x0 = (x, y, phi), shape (3,), from one by z, shape (d,).
@@ -110,8 +166,23 @@ class FeatureMap:
         by_x0[self._start_indices()] = gradient[self.decision]
         return by_x0
 
+    def gradient_by_base(self, gradient: Vector) -> Vector:
+        """Returns a gradient by the base's position, shape (2,), from one by z, shape (d,).
+
+        Goal, first reach and start stand still in the world, so that every position in z moves
+        by minus what the base moves.
+        """
+        by_base: Vector = -(self._base_selection(self.names).T @ gradient)
+        return by_base
+
     def _start_indices(self) -> list[int]:
         return [_START.index(name) for name in self.start]
+
+    @staticmethod
+    def _base_selection(names: tuple[str, ...]) -> Vector:
+        """Returns the matrix that takes the base's position out of features, shape (d, 2)."""
+        moved = [[name.endswith("_x"), name.endswith("_y")] for name in names]
+        return np.array(moved, dtype=float).reshape(-1, 2)
 
 
 PLANAR_LIC1 = FeatureMap(goal=("goal_x", "goal_y"), start=("start_y", "start_phi"))

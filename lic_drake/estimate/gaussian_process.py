@@ -57,6 +57,12 @@ class GaussianProcess:
         """
         return self._fitted().hyperparameters
 
+    @property
+    def length_scale(self) -> Vector:
+        """How far rows speak for each other along each feature, shape (d,): 1 / theta."""
+        scale: Vector = 1.0 / self.hyperparameters.theta
+        return scale
+
     def fit(self, Z: ArrayLike, f: ArrayLike, environment: ArrayLike | None = None) -> Self:
         """Learns from features Z, shape (n, d), and successes f, shape (n,); see `Predictor`."""
         Z, f = checked_rows(Z, f)
@@ -83,6 +89,11 @@ class GaussianProcess:
             probability=np.clip(posterior.mean(Z), 0.0, 1.0),
             spread=posterior.standard_deviation(Z),
         )
+
+    def values(self, Z: ArrayLike) -> Vector:
+        """Returns the posterior means at queries Z, shape (n, d): shape (n,)."""
+        posterior = self._fitted()
+        return posterior.mean(checked_queries(Z, posterior.Z.shape[1]))
 
     def value_and_gradient(self, z: ArrayLike) -> tuple[float, Vector]:
         """Returns the posterior mean at z, shape (d,), and its gradient.

@@ -1,16 +1,16 @@
 """Local sub-sampling: an estimator fitted on the nearest samples only (paper III-D, [15])."""
 
+from collections.abc import Iterator
 from typing import Protocol, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from lic_drake.estimate.checks import (
     EstimateError,
     Vector,
     checked_queries,
     checked_rows,
-    feature_scale,
 )
 from lic_drake.estimate.estimator import Prediction, SuccessEstimator
 from lic_drake.seeds import make_generator
@@ -20,6 +20,11 @@ _CACHE_SIZE = 32
 
 class LocalModel(SuccessEstimator, Protocol):
     """An estimator that can be given other rows without choosing its settings anew."""
+
+    @property
+    def length_scale(self) -> Vector:
+        """How far rows speak for each other along each feature, shape (d,)."""
+        ...
 
     def conditioned_on(self, Z: ArrayLike, f: ArrayLike) -> "LocalModel":
         """Returns an estimator with these settings that has seen the given rows only."""
@@ -38,13 +43,21 @@ class LocalEstimator:
         size: Number of rows in a local model.
     """
 
-    def __init__(self, model: LocalModel, situation: slice, *, size: int = 1000) -> None:
+    def __init__(
+        self,
+        model: LocalModel,
+        situation: slice,
+        *,
+        size: int = 1000,
+        settings_size: int = 1000,
+    ) -> None:
         """Sets up an estimator.
 
         Args:
             model: Unfitted; `fit` makes it choose its settings.
             situation: The part of z that says how near a row is.
             size: See the class.
+            settings_size: Number of rows from which the model chooses its settings.
 
         Raises:
             EstimateError: Size below 2.
@@ -52,36 +65,43 @@ class LocalEstimator:
         if size < 2:
             raise EstimateError(f"a local model needs 2 or more rows, got size {size}")
         self.size = size
+        self._settings_size = settings_size
         self._model = model
         self._situation = situation
         self._Z: Vector | None = None
         self._f = np.zeros(0)
-        self._scale = np.ones(0)
+        self._scaled = np.zeros((0, 0))
         self._cache: dict[bytes, SuccessEstimator] = {}
 
     def fit(self, Z: ArrayLike, f: ArrayLike, environment: ArrayLike | None = None) -> Self:
         """Keeps features Z, shape (n, d), and successes f, shape (n,); see `Predictor`."""
         Z, f = checked_rows(Z, f)
         order = make_generator("training", "order of local rows").permutation(len(Z))
-        part = order[: self.size]
+        part = order[: max(self._settings_size, self.size)]
         self._model.fit(
             Z[part], f[part], None if environment is None else np.asarray(environment)[part]
         )
         self._Z, self._f = Z[order], f[order]
-        self._scale = feature_scale(Z[:, self._situation])
+        self._scaled = self._Z[:, self._situation] / self._model.length_scale[self._situation]
         self._cache.clear()
         return self
 
     def predict(self, Z: ArrayLike) -> Prediction:
         """Estimates P(success) for queries Z, shape (n, d); see `Predictor`."""
         Z = checked_queries(Z, self._fitted().shape[1])
-        situations, group = np.unique(Z[:, self._situation], axis=0, return_inverse=True)
         probability, spread = np.empty(len(Z)), np.empty(len(Z))
-        for i, situation in enumerate(situations):
-            members = group == i
+        for situation, members in self._situations(Z):
             prediction = self._local_model(situation).predict(Z[members])
             probability[members], spread[members] = prediction.probability, prediction.spread
         return Prediction(probability=probability, spread=spread)
+
+    def values(self, Z: ArrayLike) -> Vector:
+        """Returns the local models' estimates for queries Z, shape (n, d): shape (n,)."""
+        Z = checked_queries(Z, self._fitted().shape[1])
+        values = np.empty(len(Z))
+        for situation, members in self._situations(Z):
+            values[members] = self._local_model(situation).values(Z[members])
+        return values
 
     def value_and_gradient(self, z: ArrayLike) -> tuple[float, Vector]:
         """Returns the local model's value and gradient at z, shape (d,).
@@ -92,13 +112,20 @@ class LocalEstimator:
         query = checked_queries(np.atleast_2d(z), self._fitted().shape[1])[0]
         return self._local_model(query[self._situation]).value_and_gradient(query)
 
+    def _situations(self, Z: Vector) -> Iterator[tuple[Vector, NDArray[np.intp]]]:
+        """Yields each distinct situation with the queries in it."""
+        situations, group = np.unique(Z[:, self._situation], axis=0, return_inverse=True)
+        order = np.argsort(group.ravel(), kind="stable")
+        members = np.split(order, np.cumsum(np.bincount(group.ravel()))[:-1])
+        yield from zip(situations, members, strict=True)
+
     def _local_model(self, situation: Vector) -> SuccessEstimator:
         rows = self._fitted()
         if len(rows) <= self.size:
             return self._model
         key = situation.tobytes()
         if key not in self._cache:
-            offsets = (rows[:, self._situation] - situation) / self._scale
+            offsets = self._scaled - situation / self._model.length_scale[self._situation]
             nearest = np.argsort(np.sum(offsets**2, axis=1), kind="stable")[: self.size]
             if len(self._cache) >= _CACHE_SIZE:
                 del self._cache[next(iter(self._cache))]

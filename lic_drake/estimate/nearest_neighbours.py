@@ -8,13 +8,12 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from lic_drake.estimate.averaging import average_rows
-from lic_drake.estimate.bandwidth import gaussian_weights, query_neighbours, select_bandwidth
+from lic_drake.estimate.bandwidth import gaussian_weights, query_neighbours, select_bandwidths
 from lic_drake.estimate.checks import (
     EstimateError,
     Vector,
     checked_queries,
     checked_rows,
-    feature_scale,
 )
 from lic_drake.estimate.estimator import Prediction
 from lic_drake.estimate.folds import selection_folds
@@ -22,13 +21,12 @@ from lic_drake.estimate.folds import selection_folds
 
 @dataclass(frozen=True, kw_only=True)
 class _Points:
-    """Distinct feature vectors, divided by `scale`, with their success rates and counts."""
+    """Distinct feature vectors, divided by the bandwidths, with their success rates and counts."""
 
     tree: cKDTree
     points: Vector
     rate: Vector
     count: Vector
-    scale: Vector
 
 
 class NearestNeighbours:
@@ -36,7 +34,7 @@ class NearestNeighbours:
 
     Neighbours are distinct feature vectors, each with the mean and the number of its reaches:
     among raw rows a tie at the K-th place would let the order of rows choose environments.
-    Distances are Euclidean in features divided by their standard deviation.
+    Distances d are Euclidean in features divided by their bandwidths, weights exp(-d^2 / 2).
 
     The spread is the standard deviation of the weighted average if each reach is an independent
     draw (Kish's effective sample size, Jeffreys' prior). It knows nothing of the luck that
@@ -46,31 +44,32 @@ class NearestNeighbours:
         neighbours: K, the number of distinct feature vectors averaged.
     """
 
-    def __init__(self, *, neighbours: int = 200, bandwidth: float | None = None) -> None:
+    def __init__(self, *, neighbours: int = 200, bandwidth: ArrayLike | None = None) -> None:
         """Sets up an estimator.
 
         Args:
             neighbours: See the class.
-            bandwidth: Standard deviation h of the weights exp(-d^2 / (2 h^2)), in standard
-                deviations of the features. By default `fit` takes the one that best predicts
-                environments that were held out.
+            bandwidth: Standard deviation of the weights along each feature, shape (d,), in its
+                unit. By default `fit` takes those that best predict environments that were held
+                out.
 
         Raises:
             EstimateError: K below 1, or a bandwidth that is not positive.
         """
-        if neighbours < 1 or (bandwidth is not None and not bandwidth > 0.0):
+        given = None if bandwidth is None else np.asarray(bandwidth, dtype=float)
+        if neighbours < 1 or (given is not None and not np.all(given > 0.0)):
             raise EstimateError(
-                "nearest neighbours need 1 or more neighbours and a positive bandwidth,"
+                "nearest neighbours need 1 or more neighbours and positive bandwidths,"
                 f" got {neighbours} and {bandwidth}"
             )
         self.neighbours = neighbours
-        self._given = bandwidth
-        self._chosen: float | None = bandwidth
+        self._given = given
+        self._chosen = given
         self._points: _Points | None = None
 
     @property
-    def bandwidth(self) -> float:
-        """The bandwidth in use, in standard deviations of the features.
+    def bandwidth(self) -> Vector:
+        """The bandwidths in use, shape (d,), in the units of the features.
 
         Raises:
             EstimateError: Neither given nor fitted yet.
@@ -79,27 +78,35 @@ class NearestNeighbours:
             raise EstimateError("the bandwidth is not chosen yet; call fit(Z, f) first")
         return self._chosen
 
+    @property
+    def length_scale(self) -> Vector:
+        """How far rows speak for each other along each feature, shape (d,): the bandwidths."""
+        return self.bandwidth
+
     def fit(self, Z: ArrayLike, f: ArrayLike, environment: ArrayLike | None = None) -> Self:
         """Learns from features Z, shape (n, d), and successes f, shape (n,); see `Predictor`."""
         Z, f = checked_rows(Z, f)
         rows = average_rows(Z, f)
-        scale = feature_scale(rows.Z)
-        points = rows.Z / scale
-        tree = cKDTree(points)
         if self._given is None:
             fold = selection_folds(environment, len(f))
-            self._chosen = select_bandwidth(tree, self.neighbours, rows.member, f, fold)
+            self._chosen = select_bandwidths(rows, self.neighbours, f, fold)
+        points = rows.Z / self.bandwidth
         self._points = _Points(
-            tree=tree, points=points, rate=rows.rate, count=rows.count, scale=scale
+            tree=cKDTree(points), points=points, rate=rows.rate, count=rows.count
         )
         return self
+
+    def conditioned_on(self, Z: ArrayLike, f: ArrayLike) -> "NearestNeighbours":
+        """Returns neighbours with these bandwidths among other rows only."""
+        other = NearestNeighbours(neighbours=self.neighbours, bandwidth=self.bandwidth)
+        return other.fit(Z, f)
 
     def predict(self, Z: ArrayLike) -> Prediction:
         """Estimates P(success) for queries Z, shape (n, d); see `Predictor`."""
         at = self._fitted()
-        queries = checked_queries(Z, len(at.scale)) / at.scale
+        queries = checked_queries(Z, at.points.shape[1]) / self.bandwidth
         distance, index = query_neighbours(at.tree, queries, self.neighbours)
-        weight = gaussian_weights(distance, self.bandwidth)
+        weight = gaussian_weights(distance)
         weighted_count = weight * at.count[index]
         total = weighted_count.sum(axis=1)
         probability = np.sum(weighted_count * at.rate[index], axis=1) / total
@@ -110,6 +117,10 @@ class NearestNeighbours:
             spread=np.sqrt(p * (1.0 - p) / sample_size),
         )
 
+    def values(self, Z: ArrayLike) -> Vector:
+        """Returns the weighted averages at queries Z, shape (n, d): shape (n,)."""
+        return self.predict(Z).probability
+
     def value_and_gradient(self, z: ArrayLike) -> tuple[float, Vector]:
         """Returns the weighted average at z, shape (d,), and its gradient.
 
@@ -117,14 +128,14 @@ class NearestNeighbours:
         and has a small jump where they change.
         """
         at = self._fitted()
-        query = checked_queries(np.atleast_2d(z), len(at.scale))[0] / at.scale
+        query = checked_queries(np.atleast_2d(z), at.points.shape[1])[0] / self.bandwidth
         distance, index = query_neighbours(at.tree, query, self.neighbours)
-        weight = gaussian_weights(distance, self.bandwidth) * at.count[index]
+        weight = gaussian_weights(distance) * at.count[index]
         weight /= weight.sum()
         rate = at.rate[index]
         value = weight @ rate
         pull = (weight * (rate - value)) @ (at.points[index] - query)
-        return float(value), pull / (self.bandwidth**2 * at.scale)
+        return float(value), pull / self.bandwidth
 
     def _fitted(self) -> _Points:
         if self._points is None:

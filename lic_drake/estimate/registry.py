@@ -41,8 +41,21 @@ def estimator_names() -> tuple[str, ...]:
     return tuple(_ESTIMATORS)
 
 
-register_estimator("gp", lambda features: GaussianProcess())
-register_estimator("knn", lambda features: NearestNeighbours())
+def _process(features: FeatureMap) -> SuccessEstimator:
+    """All rows of LIC-1, averaged; of LIC-2's many rows the nearest."""
+    if not features.observed:
+        return GaussianProcess()
+    return LocalEstimator(GaussianProcess(average=False), features.situation)
+
+
+def _neighbours(features: FeatureMap) -> SuccessEstimator:
+    if not features.observed:
+        return NearestNeighbours()
+    return LocalEstimator(NearestNeighbours(), features.situation)
+
+
+register_estimator("gp", _process)
+register_estimator("knn", _neighbours)
 register_estimator(
     "gp-raw",
     lambda features: LocalEstimator(GaussianProcess(average=False), features.situation),

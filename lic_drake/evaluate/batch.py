@@ -10,6 +10,7 @@ from lic_drake.experience.workers import prepare_worker
 from lic_drake.reach.request import ReachRecord, ReachRequest, make_request
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.starts import make_starts
 from lic_drake.seeds import make_generator
 
 CHUNK = 20
@@ -27,15 +28,17 @@ def random_requests(
         environments: Number of environments, from index 0.
         goals: Number of goals in each; of starts to its goal where an environment offers one.
     """
-    starts = scenario.task.start_line.grid(scenario.arm())
     requests = []
     for environment in range(environments):
+        starts = make_starts(scenario, scenario.sample_instance(stream, environment)).grid
         for goal in range(goals):
             index = 0 if scenario.task.goal_area is None else goal
             p_WG = scenario.sample_goal(stream, environment, index)
             rng = make_generator(stream, "rnd", environment, goal)
-            x0 = starts[rng.integers(len(starts))]
-            requests.append(make_request(scenario, stream, environment, p_WG, x0))
+            i = rng.integers(len(starts.x0))
+            requests.append(
+                make_request(scenario, stream, environment, p_WG, starts.x0[i], starts.p_WR[i])
+            )
     return requests
 
 
@@ -81,6 +84,7 @@ def simulate_requests(
             )
     finally:
         executor.shutdown(cancel_futures=True)
+    library.compact()
     return records
 
 

@@ -12,25 +12,21 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from lic_drake.errors import LicError
-from lic_drake.estimate.estimator import SuccessEstimator
-from lic_drake.estimate.features import PLANAR_LIC1
-from lic_drake.estimate.registry import make_estimator
+from lic_drake.evaluate.density import density_lattice, estimate_density
 from lic_drake.evaluate.plots import draw_density, draw_top_view, save_figure
-from lic_drake.evaluate.trial import Attempt, planar_arm_of
+from lic_drake.evaluate.trial import Attempt, planar_arm_of, run_trial
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.recording import ReachRecording
-from lic_drake.reach.request import is_within_reach, make_request
-from lic_drake.reach.rollout import make_record
+from lic_drake.reach.request import ReachRecord, ReachRequest, is_within_reach
+from lic_drake.reach.rollout import make_record, simulate_request
 from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.starts import Starts, make_starts
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.select.lic import LicSelector
-from lic_drake.select.registry import make_selector, needs_library
-from lic_drake.select.situation import Situation, StartSet
+from lic_drake.select.registry import Selector, make_selector, needs_library
+from lic_drake.select.situation import FailedReach, Selection, Situation
 
 Vector = NDArray[np.float64]
-
-DENSITY_SHAPE = (81, 91)
-"""Lattice of the density picture: y every 1 cm, phi every 2 degrees."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,44 +70,35 @@ def demonstrate(
     needs_library(method)
     _make_folder(out)
     arm = planar_arm_of(scenario)
-    starts = StartSet(arm=arm, line=scenario.task.start_line)
     instance = scenario.sample_instance("evaluation", seed)
+    starts = make_starts(scenario, instance)
     draws = (scenario.sample_goal("evaluation", seed, index) for index in itertools.count())
-    p_WG = next(goal for goal in draws if is_within_reach(scenario, goal))
+    p_WG = next(goal for goal in draws if _can_be_reached(scenario, starts, goal))
     columns = library.columns()
     say(
         f"{scenario.category}, evaluation environment {seed}: goal at"
         f" ({p_WG[0]:.3f}, {p_WG[1]:.3f}) m; learning from {library.num_reaches} reaches"
     )
-    selector = make_selector(method, arm, columns, np.random.default_rng(seed))
-
+    selector = _Talking(
+        make_selector(method, arm, columns, np.random.default_rng(seed), scenario.category), say
+    )
     recording = ReachRecording(scenario, instance)
-    done: list[tuple[Attempt, ReachTrace]] = []
-    for number in range(1, attempts + 1):
-        failed = tuple(attempt.selection.x0 for attempt, _ in done)
-        selection = selector.select(Situation(p_WG=p_WG, starts=starts, failed=failed))
-        estimate = (
-            ""
-            if selection.probability is None
-            else f", estimated success {100 * selection.probability:.0f} %"
-        )
-        say(
-            f"attempt {number}: {method} starts at y {selection.x0[1]:+.3f} m, phi"
-            f" {np.rad2deg(selection.x0[2]):+.1f} degrees{estimate}"
-            f" (chosen in {selection.seconds:.2f} s)"
-        )
-        request = make_request(scenario, "evaluation", seed, p_WG, selection.x0)
+    traces: list[ReachTrace] = []
+
+    def reach(request: ReachRequest) -> ReachRecord:
         began = time.perf_counter()
-        result = recording.add_reach(selection.x0, p_WG)
+        result = simulate_request(request, keep_states=True)
         record = make_record(request, result, time.perf_counter() - began)
+        recording.add_reach(result.trace, p_WG)
+        traces.append(result.trace)
         say(
-            f"attempt {number}: {record.outcome} after {record.duration_s:.1f} s, nearest to the"
-            f" goal {1000 * record.min_distance:.0f} mm, peak force {record.peak_force:.1f} N,"
+            f"attempt {len(traces)}: {record.outcome} after {record.duration_s:.1f} s, nearest to"
+            f" the goal {1000 * record.min_distance:.0f} mm, peak force {record.peak_force:.1f} N,"
             f" simulated in {record.wall_time_s:.1f} s"
         )
-        done.append((Attempt(selection=selection, request=request, record=record), result.trace))
-        if record.success:
-            break
+        return record
+
+    done = run_trial(scenario, selector, "evaluation", seed, p_WG, attempts, reach=reach)
 
     files = {
         "recording": out / "demo.html",
@@ -120,33 +107,59 @@ def demonstrate(
         "data": out / "demo.json",
     }
     recording.save(files["recording"])
-    labels = [f"{_ordinal(i)} start: {a.record.outcome}" for i, (a, _) in enumerate(done)]
-    if isinstance(selector, LicSelector):
-        estimator, estimator_name = selector.estimator, method
-    else:
-        rows = PLANAR_LIC1.rows(columns)
-        estimator_name = "gp"
-        estimator = make_estimator(estimator_name).fit(rows.Z, rows.f, rows.environment)
-    _save_density(
-        files["density"],
-        estimator,
-        estimator_name,
-        starts,
-        p_WG,
-        [(label, a.selection.x0) for label, (a, _) in zip(labels, done, strict=True)],
-    )
+    labels = [f"{_ordinal(i)} start: {a.record.outcome}" for i, a in enumerate(done)]
+    chosen = selector.selector
+    if not isinstance(chosen, LicSelector):  # Shows what LIC would have thought of the choices.
+        chosen = make_selector("gp", arm, columns, category=scenario.category)
+    assert isinstance(chosen, LicSelector)
+    _save_density(files["density"], chosen, starts, p_WG, done)
     figure = Figure(figsize=(7, 7))
     draw_top_view(
         figure.subplots(),
         scenario,
         instance,
         p_WG,
-        [(label, trace) for label, (_, trace) in zip(labels, done, strict=True)],
+        list(zip(labels, traces, strict=True)),
     )
     save_figure(figure, files["path"])
-    demonstration = Demonstration(p_WG=p_WG, attempts=[attempt for attempt, _ in done], files=files)
+    demonstration = Demonstration(p_WG=p_WG, attempts=done, files=files)
     _write_json(demonstration, method, seed)
     return demonstration
+
+
+@dataclass(frozen=True)
+class _Talking:
+    """A strategy that says what it chose."""
+
+    selector: Selector
+    say: Callable[[str], None]
+
+    @property
+    def method(self) -> str:
+        """Name of the strategy."""
+        return self.selector.method
+
+    def select(self, situation: Situation) -> Selection:
+        """Chooses an initial condition."""
+        selection = self.selector.select(situation)
+        estimate = (
+            ""
+            if selection.probability is None
+            else f", estimated success {100 * selection.probability:.0f} %"
+        )
+        base = f", base at y {selection.p_WR[1]:+.3f} m" if np.any(selection.p_WR) else ""
+        self.say(
+            f"attempt {len(situation.failed) + 1}: {self.method} starts at y"
+            f" {selection.x0[1]:+.3f} m, phi {np.rad2deg(selection.x0[2]):+.1f}"
+            f" degrees{base}{estimate} (chosen in {selection.seconds:.2f} s)"
+        )
+        return selection
+
+
+def _can_be_reached(scenario: Scenario, starts: Starts, p_WG: Vector) -> bool:
+    """Tells whether a goal is near enough to one of the places where the base may stand."""
+    bases = np.unique(starts.grid.p_WR, axis=0)
+    return any(is_within_reach(scenario, p_WG - [*base, 0.0]) for base in bases)
 
 
 def _make_folder(out: Path) -> None:
@@ -163,24 +176,22 @@ def _make_folder(out: Path) -> None:
 
 
 def _save_density(
-    path: Path,
-    estimator: SuccessEstimator,
-    method: str,
-    starts: StartSet,
-    p_WG: Vector,
-    choices: list[tuple[str, Vector]],
+    path: Path, selector: LicSelector, starts: Starts, p_WG: Vector, attempts: list[Attempt]
 ) -> None:
-    line = starts.line
-    y = np.linspace(line.lower[1], line.upper[1], DENSITY_SHAPE[0])
-    phi = np.linspace(line.lower[2], line.upper[2], DENSITY_SHAPE[1])
-    grid = np.array([[line.x_m, yi, phi_i] for yi in y for phi_i in phi])
-    possible = np.array([starts.arm.solve_ik(x0) is not None for x0 in grid])
-    probability = np.full(len(grid), np.nan)
-    prediction = estimator.predict(PLANAR_LIC1.join(p_WG, grid[possible]))
-    probability[possible] = prediction.probability
-    figure = Figure(figsize=(7, 4.5))
-    ax = draw_density(figure.subplots(), grid, probability, DENSITY_SHAPE, choices)
-    ax.set_title(f"LIC-1 ({method}), goal ({p_WG[0]:.2f}, {p_WG[1]:.2f}) m", fontsize=10)
+    """Draws what LIC-1, and LIC-2 if there was a second attempt, made of the starts (Fig. 6)."""
+    figure = Figure(figsize=(7.0 * len(attempts), 4.5))
+    axes = figure.subplots(1, len(attempts), squeeze=False)[0]
+    conditions, shape = density_lattice(starts)
+    for number, (ax, attempt) in enumerate(zip(axes, attempts, strict=True), start=1):
+        failed = tuple(FailedReach.from_record(a.record) for a in attempts[: number - 1])
+        situation = Situation(p_WG=p_WG, starts=starts, failed=failed)
+        probability = estimate_density(selector, situation, conditions)
+        x0 = attempt.selection.x0 - [*attempt.selection.p_WR, 0.0]
+        draw_density(ax, conditions.in_R, probability, shape, [(f"attempt {number}", x0)])
+        model = 1 if selector.second is None else min(number, 2)
+        ax.set_title(
+            f"LIC-{model} ({selector.method}), goal ({p_WG[0]:.2f}, {p_WG[1]:.2f}) m", fontsize=10
+        )
     save_figure(figure, path)
 
 

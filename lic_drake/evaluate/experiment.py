@@ -1,178 +1,251 @@
-"""Trials of several strategies on the same unseen environments, resumable."""
+"""Trials of several strategies on the same unseen environments, in parallel and resumable."""
 
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.stats import binomtest
 
-from lic_drake.evaluate.batch import simulate_requests
-from lic_drake.evaluate.trial import planar_arm_of
+from lic_drake.errors import LicError
+from lic_drake.evaluate.trial import Attempt, planar_arm_of, run_trial
+from lic_drake.evaluate.trials import TrialRow, read_trials, write_trials
 from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.intervals import wilson_interval
-from lic_drake.reach.request import ReachRecord, ReachRequest, make_request
-from lic_drake.reach.scenario import Scenario
+from lic_drake.experience.workers import prepare_worker
+from lic_drake.reach.request import ReachRecord, ReachRequest
+from lic_drake.reach.rollout import run_reach
 from lic_drake.seeds import make_generator
-from lic_drake.select.registry import make_selector, needs_library
-from lic_drake.select.situation import Selection, Situation, StartSet
+from lic_drake.select.baselines import RandomSelector
+from lic_drake.select.registry import (
+    FallbackSelector,
+    Selector,
+    check_method,
+    make_selector,
+    needs_library,
+    split_method,
+)
+
+REACHES_A_BLOCK = 60
+"""About this many reaches make a unit of work: what an interruption can cost each worker."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Trial:
-    """The attempts of one strategy at one goal, in their order."""
+class Evaluation:
+    """What is to be tried; plain data that pickles.
 
-    method: str
-    environment: int
-    goal: int
-    selections: tuple[Selection, ...]
-    records: tuple[ReachRecord, ...]
-
-    def success(self, attempts: int) -> bool:
-        """Tells whether one of the first `attempts` attempts reached the goal."""
-        return any(record.success for record in self.records[:attempts])
-
-
-def run_trials(
-    scenario: Scenario,
-    experience: ExperienceLibrary,
-    results: Path,
-    methods: Sequence[str],
-    environments: int,
-    goals: int,
-    attempts: int = 1,
-    workers: int = 1,
-    say: Callable[[str], None] = print,
-) -> list[Trial]:
-    """Runs every strategy on the same goals in the same evaluation environments.
-
-    Reaches are kept in a library under `results` and not simulated again. Every attempt finds
-    the environment as it was drawn.
-
-    Args:
-        scenario: The experience library's scenario.
-        experience: What the strategies learn from.
-        results: Folder of the library of evaluation reaches.
-        methods: Strategies, see `lic_drake.select.registry.method_names`.
-        environments: Number of evaluation environments, from index 0.
+    Attributes:
+        experience: Library or libraries that the strategies learn from; the first one says the
+            scenario. Rows of attempts that came after another one serve LIC-2 only.
+        results: Folder for `trials.parquet` and the library `reaches` of the evaluation's reaches.
+        methods: Strategies, see `lic_drake.select.registry.check_method`.
+        environments: Number of environments, from index `first_environment`.
         goals: Number of random goals in each.
         attempts: How many attempts at a goal at the most.
+        stream: Seed stream of environments and goals.
+        first_environment: Index of the first environment.
+        fresh: Whether later attempts find the environment as it was drawn.
+        variant: Name for these trials among others in the same folder.
+        common_goals: Whether all environments have the goals of the first one.
+    """
+
+    experience: Path
+    results: Path
+    methods: tuple[str, ...]
+    environments: int
+    goals: int
+    attempts: int = 2
+    stream: str = "evaluation"
+    first_environment: int = 0
+    fresh: bool = False
+    variant: str = ""
+    common_goals: bool = False
+
+    @property
+    def trials_path(self) -> Path:
+        """File with a row for each attempt."""
+        return self.results / "trials.parquet"
+
+    @property
+    def reaches(self) -> ExperienceLibrary:
+        """The reaches of all attempts."""
+        return ExperienceLibrary(self.results / "reaches")
+
+
+def run_evaluation(
+    evaluation: Evaluation, workers: int = 1, say: Callable[[str], None] = print
+) -> list[TrialRow]:
+    """Runs every strategy on the same goals in the same environments.
+
+    Reaches are kept and not simulated again; selections are made anew, so that the trials always
+    are those of the present strategies and libraries.
+
+    Args:
+        evaluation: What is to be tried.
         workers: Number of processes.
         say: Gets a line now and then.
+
+    Returns:
+        The rows of these trials; the file keeps those of other variants and strategies, too.
 
     Raises:
         LicError: A method is unknown, or a library cannot be read or written.
     """
-    columns = experience.columns() if any(needs_library(method) for method in methods) else None
-    arm = planar_arm_of(scenario)
-    starts = StartSet(arm=arm, line=scenario.task.start_line)
-    trials = [
-        Trial(method=method, environment=e, goal=g, selections=(), records=())
-        for method in methods
-        for e in range(environments)
-        for g in range(goals)
-    ]
-    library = ExperienceLibrary(results)
+    for method in evaluation.methods:
+        check_method(method)
+    scenario = ExperienceLibrary(evaluation.experience).scenario()
+    planar_arm_of(scenario)
+    library = evaluation.reaches
     library.create()
-    for attempt in range(attempts):
-        open_trials = [trial for trial in trials if not trial.success(attempt)]
-        chosen: list[tuple[Trial, Selection, ReachRequest]] = []
-        for method in methods:
-            selector = make_selector(method, arm, columns, np.random.default_rng(0))
-            for trial in (trial for trial in open_trials if trial.method == method):
-                p_WG = scenario.sample_goal("evaluation", trial.environment, trial.goal)
-                if method == "rnd":
-                    # A draw of its own for every trial: independent of how many others there are.
-                    rng = make_generator(
-                        "evaluation", "rnd", trial.environment, trial.goal, attempt
+    blocks = _blocks(evaluation)
+    # Threads of linear algebra in this process would be inherited by nobody and help nobody.
+    executor = ProcessPoolExecutor(
+        workers,
+        mp_context=get_context("forkserver"),
+        initializer=_begin_worker,
+        initargs=(evaluation,),
+    )
+    began = time.perf_counter()
+    rows: list[TrialRow] = []
+    done = simulated = 0
+    try:
+        for future in as_completed([executor.submit(_run_block, block) for block in blocks]):
+            new_rows, new_records = future.result()
+            if new_records:
+                library.write_shard(f"new-{new_records[0].key}", new_records, scenario)
+            rows += new_rows
+            done += 1
+            simulated += len(new_records)
+            elapsed = time.perf_counter() - began
+            say(
+                f"  {done}/{len(blocks)} blocks, {len(rows)} attempts, {_first_rates(rows)};"
+                f" {60 * simulated / elapsed:.0f} reaches a minute,"
+                f" {elapsed * (len(blocks) - done) / done:.0f} s left; kept in {library.path}"
+            )
+    finally:
+        executor.shutdown(cancel_futures=True)
+    library.compact()
+    rows.sort(key=lambda row: (row.method, row.environment, row.goal, row.attempt))
+    others = read_trials(evaluation.trials_path) if evaluation.trials_path.exists() else []
+    write_trials(evaluation.trials_path, [*(o for o in others if not _is_of(o, evaluation)), *rows])
+    return rows
+
+
+def _is_of(row: TrialRow, evaluation: Evaluation) -> bool:
+    return row.variant == evaluation.variant and row.method in evaluation.methods
+
+
+def _first_rates(rows: Sequence[TrialRow]) -> str:
+    """Returns the success rate of first attempts of each strategy so far."""
+    parts = []
+    for method in sorted({row.method for row in rows}):
+        won = [row.success for row in rows if row.method == method and row.attempt == 1]
+        parts.append(f"{method} {100 * np.mean(won):.0f} %")
+    return ", ".join(parts)
+
+
+def _blocks(evaluation: Evaluation) -> list[range]:
+    """Returns the environments in units of work."""
+    each = evaluation.goals * len(evaluation.methods) * 1.5
+    size = max(1, round(REACHES_A_BLOCK / each))
+    first, last = evaluation.first_environment, evaluation.first_environment
+    last += evaluation.environments
+    return [range(i, min(i + size, last)) for i in range(first, last, size)]
+
+
+class _Worker:
+    """What a process keeps between blocks: fitted strategies and the reaches known so far."""
+
+    def __init__(self, evaluation: Evaluation) -> None:
+        self._evaluation = evaluation
+        experience = ExperienceLibrary(evaluation.experience)
+        self.scenario = experience.scenario()
+        self._columns = experience.columns()
+        self._selectors: dict[str, Selector] = {}
+        library = evaluation.reaches
+        self._known = {r.key: r for r in library.records()} if library.shard_paths() else {}
+        self.new: list[ReachRecord] = []
+
+    def run(self, environments: range) -> Iterator[tuple[str, int, int, list[Attempt]]]:
+        """Yields method, environment, goal and attempts of each trial."""
+        evaluation = self._evaluation
+        for environment in environments:
+            for goal in range(evaluation.goals):
+                at = evaluation.first_environment if evaluation.common_goals else environment
+                p_WG = self.scenario.sample_goal(evaluation.stream, at, goal)
+                for method in evaluation.methods:
+                    attempts = run_trial(
+                        self.scenario,
+                        self._selector(method, environment, goal),
+                        evaluation.stream,
+                        environment,
+                        p_WG,
+                        evaluation.attempts,
+                        fresh=evaluation.fresh,
+                        reach=self._reach,
                     )
-                    selector = make_selector(method, arm, columns, rng)
-                failed = tuple(selection.x0 for selection in trial.selections)
-                situation = Situation(p_WG=p_WG, starts=starts, failed=failed)
-                selection = selector.select(situation)
-                request = make_request(
-                    scenario, "evaluation", trial.environment, p_WG, selection.x0
-                )
-                chosen.append((trial, selection, request))
-        say(f"attempt {attempt + 1}: {len(chosen)} starts chosen")
-        records = simulate_requests([c[2] for c in chosen], library, scenario, workers, say)
-        extended = {
-            (trial.method, trial.environment, trial.goal): Trial(
-                method=trial.method,
-                environment=trial.environment,
-                goal=trial.goal,
-                selections=(*trial.selections, selection),
-                records=(*trial.records, records[request.key]),
+                    yield method, environment, goal, attempts
+
+    def _selector(self, method: str, environment: int, goal: int) -> Selector:
+        first, later = split_method(method)
+        if later is not None:
+            return FallbackSelector(
+                first=self._selector(first, environment, goal),
+                later=self._selector(later, environment, goal),
+                method=method,
             )
-            for trial, selection, request in chosen
-        }
-        trials = [extended.get((t.method, t.environment, t.goal), t) for t in trials]
-    return trials
-
-
-@dataclass(frozen=True, kw_only=True)
-class Rate:
-    """A strategy's success rate after a number of attempts.
-
-    Attributes:
-        method: Name of the strategy.
-        attempts: How many attempts count.
-        successes: Trials that reached the goal.
-        trials: All trials.
-        p_value: Of McNemar's exact paired test against RND on the same goals; NaN for RND.
-    """
-
-    method: str
-    attempts: int
-    successes: int
-    trials: int
-    p_value: float
-
-
-def summarize_trials(trials: Sequence[Trial], attempts: int) -> list[Rate]:
-    """Returns the success rate of each strategy after 1 to `attempts` attempts."""
-    methods = list(dict.fromkeys(trial.method for trial in trials))
-    rates = []
-    for count in range(1, attempts + 1):
-        won = {
-            method: np.array([t.success(count) for t in trials if t.method == method])
-            for method in methods
-        }
-        for method in methods:
-            rates.append(
-                Rate(
-                    method=method,
-                    attempts=count,
-                    successes=int(won[method].sum()),
-                    trials=len(won[method]),
-                    p_value=mcnemar(won[method], won["rnd"])
-                    if "rnd" in won and method != "rnd"
-                    else float("nan"),
-                )
+        if method == "rnd":
+            # Draws of its own for every trial: independent of how many others there are.
+            rng = make_generator(self._evaluation.stream, "rnd", environment, goal)
+            return RandomSelector(rng=rng)
+        if method not in self._selectors:
+            self._selectors[method] = make_selector(
+                method,
+                planar_arm_of(self.scenario),
+                self._columns if needs_library(method) else None,
+                category=self.scenario.category,
             )
-    return rates
+        return self._selectors[method]
+
+    def _reach(self, request: ReachRequest) -> ReachRecord:
+        if request.key not in self._known:
+            self._known[request.key] = run_reach(request)
+            self.new.append(self._known[request.key])
+        return self._known[request.key]
 
 
-def mcnemar(a: NDArray[np.bool_], b: NDArray[np.bool_]) -> float:
-    """Returns the p-value of McNemar's exact test for paired successes, shape (n,) each."""
-    only_a, only_b = int(np.sum(a & ~b)), int(np.sum(b & ~a))
-    if only_a + only_b == 0:
-        return 1.0
-    return float(binomtest(only_a, only_a + only_b).pvalue)
+_worker: _Worker | LicError | None = None
 
 
-def format_rates(rates: Sequence[Rate]) -> str:
-    """Returns the rates as a Markdown table."""
-    lines = [
-        "| strategy | attempts | success, % | 90 % interval | trials | p against RND |",
-        "|---|---|---|---|---|---|",
-    ]
-    for rate in rates:
-        low, high = wilson_interval(rate.successes, rate.trials)
-        p = "" if np.isnan(rate.p_value) else f"{rate.p_value:.2g}"
-        lines.append(
-            f"| {rate.method} | {rate.attempts} | {100 * rate.successes / rate.trials:.1f} |"
-            f" {100 * low:.1f}..{100 * high:.1f} | {rate.trials} | {p} |"
+def _begin_worker(evaluation: Evaluation) -> None:
+    global _worker
+    prepare_worker()
+    try:
+        _worker = _Worker(evaluation)
+    except LicError as error:  # An executor would only say that its worker broke.
+        _worker = error
+
+
+def _run_block(environments: range) -> tuple[list[TrialRow], list[ReachRecord]]:
+    if not isinstance(_worker, _Worker):
+        raise _worker or LicError("the worker was not prepared")
+    _worker.new = []
+    rows = [
+        TrialRow(
+            variant=_worker._evaluation.variant,
+            method=method,
+            environment=environment,
+            goal=goal,
+            attempt=number,
+            key=attempt.request.key,
+            success=attempt.record.success,
+            probability=float("nan")
+            if attempt.selection.probability is None
+            else attempt.selection.probability,
+            seconds=attempt.selection.seconds,
         )
-    return "\n".join(lines) + "\n"
+        for method, environment, goal, attempts in _worker.run(environments)
+        for number, attempt in enumerate(attempts, start=1)
+    ]
+    return rows, _worker.new

@@ -97,15 +97,18 @@ def draw_top_view(
             )
         else:
             ax.add_patch(Circle(position, instance.size[i, 0], color=color))
-    lower, upper = scenario.task.start_line.lower, scenario.task.start_line.upper
-    ax.plot([lower[0], upper[0]], [lower[1], upper[1]], color="tab:green", lw=1, ls="--")
+    line, track = scenario.task.start_line, scenario.task.base
+    if track is None:
+        ax.plot([line.x_m] * 2, [line.y_min_m, line.y_max_m], color="tab:green", lw=1, ls="--")
+    else:
+        ax.plot([0.0, 0.0], [track.y_min_m, track.y_max_m], color="tab:blue", lw=1, ls="--")
     for i, (label, trace) in enumerate(attempts):
         color_name = ATTEMPT_COLORS[i % len(ATTEMPT_COLORS)]
         if not trace.q:
             continue
         if isinstance(arm, PlanarArm):
             for q, alpha in ((trace.q[0], 0.25), (trace.q[-1], 0.8)):
-                _draw_arm(ax, arm, q, color_name, alpha)
+                _draw_arm(ax, arm, q, trace.p_WR, color_name, alpha)
         path = np.array(trace.p_WE)
         ax.plot(path[:, 0], path[:, 1], color=color_name, lw=1.5, label=label)
     ax.add_patch(
@@ -117,9 +120,9 @@ def draw_top_view(
     return ax
 
 
-def _draw_arm(ax: Axes, arm: PlanarArm, q: Vector, color: str, alpha: float) -> None:
+def _draw_arm(ax: Axes, arm: PlanarArm, q: Vector, p_WR: Vector, color: str, alpha: float) -> None:
     """Draws the links as bars of the skin's width."""
-    origins = arm.kinematics.link_origins(q)
+    origins = arm.kinematics.link_origins(q) + p_WR[:2]
     for capsule, begin, end in zip(arm.skin, origins[:-1], origins[1:], strict=True):
         along = (end - begin) / np.linalg.norm(end - begin)
         side = capsule.radius * np.array([-along[1], along[0]])

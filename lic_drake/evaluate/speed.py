@@ -10,7 +10,8 @@ from pydrake.systems.analysis import Simulator
 from lic_drake.control.mpc_controller import HapticMpcController
 from lic_drake.control.tactile_sensor import TactileSensor
 from lic_drake.evaluate.batch import random_requests
-from lic_drake.reach.rollout import Environment, run_reach
+from lic_drake.reach.environment import Environment
+from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.waking import WakingSimulation
 

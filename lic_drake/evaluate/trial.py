@@ -1,17 +1,16 @@
 """A trial: attempts at one goal in one environment until one succeeds (paper VI-A)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.errors import RequestError
 from lic_drake.reach.request import ReachRecord, ReachRequest, make_request
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.starts import make_starts
 from lic_drake.robots.planar import PlanarArm
 from lic_drake.select.registry import Selector
-from lic_drake.select.situation import Selection, Situation, StartSet
+from lic_drake.select.situation import FailedReach, Selection, Situation, Vector
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,13 +39,13 @@ def run_trial(
     selector: Selector,
     stream: str,
     environment: int,
-    p_WG: NDArray[np.float64],
+    p_WG: Vector,
     attempts: int,
+    *,
+    fresh: bool = False,
+    reach: Callable[[ReachRequest], ReachRecord] = run_reach,
 ) -> list[Attempt]:
     """Selects and reaches until the goal is reached or the attempts are used up.
-
-    Every attempt finds the environment as it was drawn; later attempts keep away from the starts
-    that failed.
 
     Args:
         scenario: Category, robot and rules.
@@ -55,14 +54,22 @@ def run_trial(
         environment: Its index.
         p_WG: Goal, shape (3,), metres.
         attempts: How many reaches at the most.
+        fresh: Whether every attempt finds the environment as it was drawn; otherwise it finds it
+            as the attempt before left it, as on a real robot.
+        reach: Makes a request's reach.
     """
-    starts = StartSet(arm=planar_arm_of(scenario), line=scenario.task.start_line)
+    starts = make_starts(scenario, scenario.sample_instance(stream, environment))
     done: list[Attempt] = []
     for _ in range(attempts):
-        failed = tuple(attempt.selection.x0 for attempt in done)
+        failed = tuple(FailedReach.from_record(attempt.record) for attempt in done)
         selection = selector.select(Situation(p_WG=p_WG, starts=starts, failed=failed))
-        request = make_request(scenario, stream, environment, p_WG, selection.x0)
-        done.append(Attempt(selection=selection, request=request, record=run_reach(request)))
+        if done and not fresh:
+            request = done[-1].request.then(selection.x0, selection.p_WR)
+        else:
+            request = make_request(
+                scenario, stream, environment, p_WG, selection.x0, selection.p_WR
+            )
+        done.append(Attempt(selection=selection, request=request, record=reach(request)))
         if done[-1].record.success:
             break
     return done

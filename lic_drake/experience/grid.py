@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from lic_drake.errors import LibraryError, RequestError
 from lic_drake.experience.files import readable_errors, write_atomically
 from lic_drake.experience.schema import scenario_text
-from lic_drake.reach.request import ReachRequest
+from lic_drake.reach.request import ReachRequest, make_request
 from lic_drake.reach.scenario import Scenario, parse_scenario
+from lic_drake.reach.starts import InitialConditions, training_starts
 from lic_drake.seeds import STREAMS
 
 REQUEST_FILE = "_collection.yaml"
@@ -78,33 +79,31 @@ class CollectionRequest:
         index = self.first_environment if environment is None else environment
         return _thin(self.scenario.goals(self.stream, index), self.max_goals)
 
-    def starts(self) -> NDArray[np.float64]:
-        """Returns the start poses x0, shape (m, 3), metres and radians.
+    def starts(self, environment: int | None = None) -> InitialConditions:
+        """Returns the m initial conditions in an environment; m is the same in all.
+
+        Args:
+            environment: Its index in the stream; the first one by default.
 
         Raises:
-            RequestError: The arm can take no start pose of the grid.
+            RequestError: The arm can take no start pose.
         """
-        grid = self.scenario.task.start_line.grid(self.scenario.arm())
-        if len(grid) == 0:
+        index = self.first_environment if environment is None else environment
+        starts = training_starts(self.scenario, self.stream, index)
+        if len(starts.x0) == 0:
             raise RequestError(
                 f"{self.scenario.robot} can take no pose of the start line's grid;"
                 " change task.start_line in the scenario"
             )
-        return _thin(grid, self.max_starts)
+        return starts.take(_thin(np.arange(len(starts.x0)), self.max_starts))
 
     def reaches(self, environment: int) -> list[ReachRequest]:
         """Returns the reaches into one environment; the starts vary fastest."""
-        starts = _triples(self.starts())
+        starts = self.starts(environment)
         return [
-            ReachRequest(
-                scenario=self.scenario,
-                stream=self.stream,
-                environment=environment,
-                goal=goal,
-                start=start,
-            )
-            for goal in _triples(self.goals(environment))
-            for start in starts
+            make_request(self.scenario, self.stream, environment, p_WG, x0, p_WR)
+            for p_WG in self.goals(environment)
+            for x0, p_WR in zip(*starts, strict=True)
         ]
 
     def refuse_unless_continuing(self, stored: "CollectionRequest", path: Path) -> None:
@@ -203,14 +202,9 @@ def _write_text(path: Path, content: str) -> None:
     path.write_text(content, encoding="utf-8")
 
 
-def _thin(grid: NDArray[np.float64], count: int | None) -> NDArray[np.float64]:
+def _thin[T: np.generic](grid: NDArray[T], count: int | None) -> NDArray[T]:
     """Returns `count` rows from the middles of equal parts of a grid, or all of it."""
     if count is None or count >= len(grid):
         return grid
     middles = ((np.arange(count) + 0.5) * len(grid) / count).astype(int)
     return np.take(grid, middles, axis=0)
-
-
-def _triples(rows: NDArray[np.float64]) -> list[tuple[float, float, float]]:
-    """Returns rows of shape (n, 3) as plain floats."""
-    return [(a, b, c) for a, b, c in rows.tolist()]

@@ -7,7 +7,7 @@ that a shard explains itself. Nothing that is read from a file is executed or un
 
 import dataclasses
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +20,9 @@ from lic_drake.errors import LibraryError
 from lic_drake.reach.request import ReachRecord
 from lic_drake.reach.scenario import Scenario, to_dict
 
-SCHEMA_VERSION = 1
-"""Grows with every change of the columns or the metadata."""
+SCHEMA_VERSION = 2
+"""Grows with every change of the columns or the metadata. Columns that came later than version 1
+say so (`since`) and have the default that older tables are read with."""
 
 _TYPES = {
     str: pa.string(),
@@ -37,13 +38,27 @@ FIELDS: dict[str, Any] = {item.name: item.type for item in dataclasses.fields(Re
 TUPLES = [name for name, kind in FIELDS.items() if kind == tuple[float, ...]]
 """Names of the list columns."""
 
-SCHEMA = pa.schema(
-    [
-        pa.field(item.name, _TYPES[FIELDS[item.name]], nullable=False, metadata=dict(item.metadata))
-        for item in dataclasses.fields(ReachRecord)
-    ]
-)
-"""The columns, without the metadata that differs between tables."""
+_SINCE = {item.name: item.metadata.get("since", 1) for item in dataclasses.fields(ReachRecord)}
+
+
+def schema_of(version: int) -> pa.Schema:
+    """Returns the columns of a schema version, without the metadata that differs by table."""
+    return pa.schema(
+        [
+            pa.field(
+                item.name,
+                _TYPES[FIELDS[item.name]],
+                nullable=False,
+                metadata={key: str(value) for key, value in item.metadata.items()},
+            )
+            for item in dataclasses.fields(ReachRecord)
+            if _SINCE[item.name] <= version
+        ]
+    )
+
+
+SCHEMA = schema_of(SCHEMA_VERSION)
+"""The columns that this version writes."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -134,7 +149,10 @@ def _read(path: Path, columns: list[str] | None) -> tuple[TableHeader, pa.Table]
     try:
         with pq.ParquetFile(path, page_checksum_verification=True) as file:
             header = _check_schema(path, file.schema_arrow)
-            return header, file.read(columns=columns)
+            wanted = FIELDS if columns is None else columns
+            later = {name for name in wanted if _SINCE[name] > header.schema_version}
+            table = file.read(columns=[name for name in wanted if name not in later])
+            return header, _with_defaults(table, wanted, later)
     except (OSError, UnicodeDecodeError, pa.ArrowException) as error:
         # Damage makes pyarrow raise OSErrors, too, but without an error number.
         number = getattr(error, "errno", None)
@@ -143,6 +161,16 @@ def _read(path: Path, columns: list[str] | None) -> tuple[TableHeader, pa.Table]
         raise LibraryError(
             f"{path} is damaged or not a Parquet file; delete it and collect its reaches again"
         ) from error
+
+
+def _with_defaults(table: pa.Table, wanted: Iterable[str], later: set[str]) -> pa.Table:
+    """Adds the columns that came later than an older table, with their defaults."""
+    defaults = {item.name: item.default for item in dataclasses.fields(ReachRecord)}
+    for name in wanted:
+        if name in later:
+            column = pa.array([defaults[name]] * table.num_rows, SCHEMA.field(name).type)
+            table = table.append_column(SCHEMA.field(name), column)
+    return table.select(list(wanted))
 
 
 def _check_schema(path: Path, schema: pa.Schema) -> TableHeader:
@@ -160,15 +188,16 @@ def _check_schema(path: Path, schema: pa.Schema) -> TableHeader:
             f"{path} is not part of an experience library (no lic_drake metadata);"
             " move it out of the library's folder"
         ) from None
-    if header.schema_version != SCHEMA_VERSION:
+    if not 1 <= header.schema_version <= SCHEMA_VERSION:
         raise LibraryError(
             f"{path} has schema version {header.schema_version}, written by lic_drake"
-            f" {header.lic_drake_version}; this lic_drake {lic_drake.__version__} reads version"
-            f" {SCHEMA_VERSION}: use that lic_drake, or collect the library again"
+            f" {header.lic_drake_version}; this lic_drake {lic_drake.__version__} reads versions up"
+            f" to {SCHEMA_VERSION}: use that lic_drake, or collect the library again"
         )
-    if not schema.equals(SCHEMA, check_metadata=False):
-        odd = sorted(set(SCHEMA.names) ^ set(schema.names)) or [
-            name for name in SCHEMA.names if schema.field(name).type != SCHEMA.field(name).type
+    expected = schema_of(header.schema_version)
+    if not schema.equals(expected, check_metadata=False):
+        odd = sorted(set(expected.names) ^ set(schema.names)) or [
+            name for name in expected.names if schema.field(name).type != expected.field(name).type
         ]
         raise LibraryError(
             f"{path} has other columns than this lic_drake writes ({', '.join(odd) or 'order'});"

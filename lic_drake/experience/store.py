@@ -23,6 +23,9 @@ from lic_drake.reach.scenario import Scenario, parse_scenario
 
 SUFFIX = ".parquet"
 
+COMPACTED = "reaches"
+"""Name of the shard that holds all rows after `ExperienceLibrary.compact`."""
+
 
 class ExperienceLibrary:
     """Reaches of one scenario: a folder of shards, or a single Parquet file.
@@ -162,6 +165,25 @@ class ExperienceLibrary:
         path = self.shard_path(name)
         write_atomically(path, lambda temporary: write_table(table, temporary))
         return path
+
+    def compact(self) -> None:
+        """Writes all shards of a folder as one; a kill on the way loses nothing.
+
+        Raises:
+            LibraryError: As `header`, or the folder cannot be written.
+        """
+        paths = self.shard_paths()
+        if len(paths) < 2 or self.path.is_file():
+            return
+        header = self.header()
+        records = {record.key: record for record in self.records()}
+        rows = sorted(records.values(), key=lambda r: (r.stream, r.environment, r.key))
+        whole = self.shard_path(COMPACTED)
+        write_atomically(whole, lambda temporary: write_table(to_table(rows, header), temporary))
+        with readable_errors(self.path, "delete the old shards of"):
+            for path in paths:
+                if path != whole:
+                    path.unlink()
 
     def create(self) -> None:
         """Makes the folder if it is not there.

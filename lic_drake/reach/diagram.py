@@ -47,6 +47,7 @@ def make_reach_diagram(
     scenario: Scenario,
     instance: ClutterInstance,
     meshcat: Meshcat | None = None,
+    base_slides: bool = False,
 ) -> ReachDiagram:
     """Builds the diagram of one environment.
 
@@ -54,11 +55,19 @@ def make_reach_diagram(
         scenario: Robot, contact, controller.
         instance: The clutter.
         meshcat: Where to draw the scene and its contact forces, if anywhere.
+        base_slides: Whether the base can be moved, for drawings; see `add_scene`.
     """
     builder = DiagramBuilder()
     arm = scenario.arm()
     layout = planar_taxels(arm.skin)
-    scene = add_scene(builder, arm, instance, scenario.scene, visuals=meshcat is not None)
+    scene = add_scene(
+        builder,
+        arm,
+        instance,
+        scenario.scene,
+        visuals=meshcat is not None,
+        base_slides=base_slides,
+    )
     plant = scene.plant
     plant.set_name("plant")
 

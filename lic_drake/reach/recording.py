@@ -12,10 +12,9 @@ from pydrake.math import RigidTransform
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import LicError
 from lic_drake.reach.diagram import make_reach_diagram
-from lic_drake.reach.rollout import Environment
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.simulation import Simulation
-from lic_drake.reach.trace import ReachResult
+from lic_drake.reach.trace import ReachTrace
 
 Vector = NDArray[np.float64]
 
@@ -43,16 +42,15 @@ def frame_rate(control_rate_hz: float) -> float:
 class ReachRecording:
     """A Meshcat scene of one environment in which reaches are recorded one after another.
 
-    A reach is simulated first, as anywhere else, and its samples are drawn afterwards. Must be
-    used from the thread that made it.
+    A reach is simulated first, as anywhere else but with its states kept, and its samples are
+    drawn afterwards. Must be used from the thread that made it.
     """
 
     def __init__(self, scenario: Scenario, instance: ClutterInstance) -> None:
         self._scenario = scenario
-        self._environment = Environment(scenario, instance)
         self._meshcat = _make_meshcat()
         self._frames_per_second = frame_rate(scenario.mpc.rate_hz)
-        diagram = make_reach_diagram(scenario, instance, self._meshcat)
+        diagram = make_reach_diagram(scenario, instance, self._meshcat, base_slides=True)
         self._drawing = Simulation(diagram, scenario.scene)
         self._draw_start_line()
         self._meshcat.SetProperty("/Background", "top_color", [0.97, 0.97, 0.98])
@@ -65,23 +63,21 @@ class ReachRecording:
         )
         self._clock_s = 0.0
 
-    def add_reach(self, x0: Vector, p_WG: Vector) -> ReachResult:
-        """Simulates and records a reach in the environment as it was drawn.
+    def add_reach(self, trace: ReachTrace, p_WG: Vector) -> None:
+        """Records a reach.
 
         Args:
-            x0: Start pose of the hand.
-            p_WG: Goal, shape (3,), metres.
+            trace: Its samples with their states.
+            p_WG: Its goal, shape (3,), metres.
         """
         self._draw_goal(p_WG)
-        result = self._environment.reach(p_WG, x0, keep_states=True)
-        trace = result.trace
+        self._drawing.set_base(trace.p_WR)
         every = round(self._scenario.mpc.rate_hz / self._frames_per_second)
         for k in range(0, len(trace.states), every):
             self._drawing.set_state(trace.states[k])
             self._drawing.publish(self._clock_s + trace.time_s[k])
         if trace.time_s:
             self._clock_s += math.ceil(trace.time_s[-1] + PAUSE_S)
-        return result
 
     def save(self, path: Path) -> None:
         """Writes the recording.
@@ -97,9 +93,14 @@ class ReachRecording:
             raise LicError(f"cannot write {path}: {error.strerror}") from None
 
     def _draw_start_line(self) -> None:
-        lower, upper = self._scenario.task.start_line.lower, self._scenario.task.start_line.upper
-        ends = np.array([[lower[0], lower[1], -0.1], [upper[0], upper[1], -0.1]])
-        self._meshcat.SetLine("/task/start_line", ends.T, 3.0, Rgba(0.1, 0.65, 0.2, 1.0))
+        """Draws where the hand may start, green, or, with a mobile base, where that may, blue."""
+        line, track = self._scenario.task.start_line, self._scenario.task.base
+        if track is None:
+            ends = np.array([[line.x_m, line.y_min_m, -0.1], [line.x_m, line.y_max_m, -0.1]])
+            self._meshcat.SetLine("/task/start_line", ends.T, 3.0, Rgba(0.1, 0.65, 0.2, 1.0))
+        else:
+            ends = np.array([[0.0, track.y_min_m, -0.1], [0.0, track.y_max_m, -0.1]])
+            self._meshcat.SetLine("/task/base_track", ends.T, 3.0, Rgba(0.1, 0.3, 0.8, 1.0))
 
     def _draw_goal(self, p_WG: Vector) -> None:
         radius = self._scenario.stop.success_distance_m

@@ -2,7 +2,8 @@
 
 import hashlib
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,18 @@ failure of the simulator; before it began, because the arm cannot stand at the s
 the goal is further away than the arm is long."""
 
 
+class EarlierReach(NamedTuple):
+    """A reach to the same goal that went before and left the environment as it is found.
+
+    Attributes:
+        start: Hand pose x0 that it began with, in W; in the plane (x, y, phi), metres and radians.
+        base: p_WR in the plane, (x, y), metres.
+    """
+
+    start: tuple[float, float, float]
+    base: tuple[float, float]
+
+
 @dataclass(frozen=True, kw_only=True)
 class ReachRequest:
     """One reach to simulate. The record is a pure function of it.
@@ -25,7 +38,10 @@ class ReachRequest:
         stream: Seed stream of the environment, one of `lic_drake.seeds.STREAMS`.
         environment: Index of the environment in its stream.
         goal: p_WG, (x, y, z), metres.
-        start: Hand pose x0; in the plane (x, y, phi), metres and radians.
+        start: Hand pose x0 in W; in the plane (x, y, phi), metres and radians.
+        base: Where the mobile base stands during the reach, p_WR in the plane, (x, y), metres.
+        after: Reaches to the same goal that went before, in their order; without any the
+            environment is as it was drawn.
     """
 
     scenario: Scenario
@@ -33,12 +49,39 @@ class ReachRequest:
     environment: int
     goal: tuple[float, float, float]
     start: tuple[float, float, float]
+    base: tuple[float, float] = (0.0, 0.0)
+    after: tuple[EarlierReach, ...] = ()
 
     @property
     def key(self) -> str:
         """Identifies the request in a library: 16 hexadecimal digits."""
         content = [self.scenario.digest, self.stream, self.environment, self.goal, self.start]
+        # Left out where they are as in libraries from before there were any.
+        if self.base != (0.0, 0.0) or self.after:
+            content += [self.base, self.after]
         return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
+
+    @property
+    def p_WR(self) -> NDArray[np.float64]:
+        """Position of the base, shape (3,), metres."""
+        return np.array([*self.base, 0.0])
+
+    def before(self) -> "ReachRequest | None":
+        """Returns the request of the reach that went before; None if it is the first."""
+        if not self.after:
+            return None
+        last = self.after[-1]
+        return replace(self, start=last.start, base=last.base, after=self.after[:-1])
+
+    def then(self, x0: NDArray[np.float64], p_WR: NDArray[np.float64]) -> "ReachRequest":
+        """Returns the request of a further reach to the same goal.
+
+        Args:
+            x0: Its start pose, shape (3,).
+            p_WR: Its base, shape (2,) or (3,), metres.
+        """
+        earlier = EarlierReach(start=self.start, base=self.base)
+        return replace(self, start=_triple(x0), base=_pair(p_WR), after=(*self.after, earlier))
 
 
 def make_request(
@@ -47,15 +90,35 @@ def make_request(
     environment: int,
     p_WG: NDArray[np.float64],
     x0: NDArray[np.float64],
+    p_WR: NDArray[np.float64] | None = None,
 ) -> ReachRequest:
-    """Returns a request from arrays: goal p_WG, shape (3,), and start pose x0, shape (3,)."""
+    """Returns the request of a first reach from arrays.
+
+    Args:
+        scenario: Category, robot and rules.
+        stream: Seed stream of the environment.
+        environment: Its index.
+        p_WG: Goal, shape (3,), metres.
+        x0: Start pose, shape (3,).
+        p_WR: Base, shape (2,) or (3,), metres; by default at the origin.
+    """
     return ReachRequest(
         scenario=scenario,
         stream=stream,
         environment=environment,
-        goal=(float(p_WG[0]), float(p_WG[1]), float(p_WG[2])),
-        start=(float(x0[0]), float(x0[1]), float(x0[2])),
+        goal=_triple(p_WG),
+        start=_triple(x0),
+        base=(0.0, 0.0) if p_WR is None else _pair(p_WR),
     )
+
+
+def _triple(values: NDArray[np.float64]) -> tuple[float, float, float]:
+    return float(values[0]), float(values[1]), float(values[2])
+
+
+def _pair(values: NDArray[np.float64]) -> tuple[float, float]:
+    # Adding zero makes -0.0 and 0.0 the same base with the same key.
+    return float(values[0]) + 0.0, float(values[1]) + 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,6 +167,16 @@ class ReachRecord:
     detail: str = field(metadata={"unit": "", "doc": "why a reach diverged or never began"})
     lic_drake_version: str = field(metadata={"unit": "", "doc": "version of lic_drake"})
     drake_version: str = field(metadata={"unit": "", "doc": "version of Drake"})
+    base_x: float = field(default=0.0, metadata={"unit": "m", "doc": "base p_WR", "since": 2})
+    base_y: float = field(default=0.0, metadata={"unit": "m", "doc": "base p_WR", "since": 2})
+    after: tuple[float, ...] = field(
+        default=(),
+        metadata={
+            "unit": "m, m, rad, m, m",
+            "doc": "x0 and p_WR of each reach that went before",
+            "since": 2,
+        },
+    )
 
     @property
     def p_WG(self) -> NDArray[np.float64]:
@@ -114,6 +187,20 @@ class ReachRecord:
     def x0(self) -> NDArray[np.float64]:
         """The start pose (x, y, phi), metres and radians."""
         return np.array([self.start_x, self.start_y, self.start_phi])
+
+
+def request_of(record: ReachRecord, scenario: Scenario) -> ReachRequest:
+    """Returns the request that a record answers; `scenario` is the one that it was made with."""
+    after = np.array(record.after).reshape(-1, 5)
+    return ReachRequest(
+        scenario=scenario,
+        stream=record.stream,
+        environment=record.environment,
+        goal=_triple(record.p_WG),
+        start=_triple(record.x0),
+        base=(record.base_x, record.base_y),
+        after=tuple(EarlierReach(start=_triple(row[:3]), base=_pair(row[3:])) for row in after),
+    )
 
 
 def check_goal(scenario: Scenario, p_WG: NDArray[np.float64]) -> None:

@@ -45,7 +45,7 @@ class Scenario:
     @property
     def digest(self) -> str:
         """Identifies the scenario's values: 12 hexadecimal digits."""
-        values = json.dumps(to_dict(self), sort_keys=True, default=repr)
+        values = json.dumps(_identity(self), sort_keys=True, default=repr)
         return hashlib.sha256(values.encode()).hexdigest()[:12]
 
     def arm(self) -> Arm:
@@ -77,10 +77,15 @@ class Scenario:
     def goals(self, stream: str, environment: int) -> Vector:
         """Returns the goals p_WG that a collection tries in an environment, shape (n, 3), metres.
 
-        They are the grid of the goal area, or, without one, the goal that the environment offers.
+        They are the grid of the goal area or random goals in it, or, without an area, the goal
+        that the environment offers.
         """
-        if self.task.goal_area is not None:
-            return self.task.goal_area.grid()
+        area = self.task.goal_area
+        if area is not None:
+            if area.random_goals == 0:
+                return area.grid()
+            indices = range(area.random_goals)
+            return np.array([self.sample_goal(stream, environment, i) for i in indices])
         p_WG = self.sample_instance(stream, environment).p_WG
         return np.empty((0, 3)) if p_WG is None else p_WG[np.newaxis]
 
@@ -88,6 +93,20 @@ class Scenario:
 def to_dict(scenario: Scenario) -> dict[str, Any]:
     """Returns the scenario's values as nested plain dictionaries."""
     return dataclasses.asdict(scenario)
+
+
+def _identity(part: Any) -> dict[str, Any]:
+    """Returns the values that make a scenario what it is.
+
+    Fields that came later (`since`) are left out where they have their default: the scenario is
+    then the same as before there was such a field.
+    """
+    values = {}
+    for item in dataclasses.fields(part):
+        value = getattr(part, item.name)
+        if "since" not in item.metadata or value != item.default:
+            values[item.name] = _identity(value) if dataclasses.is_dataclass(value) else value
+    return values
 
 
 def load_scenario(name_or_path: str | Path, overrides: str = "") -> Scenario:
@@ -151,6 +170,12 @@ def parse_scenario(content: str, overrides: str = "", source: str = "scenario") 
         raise ScenarioError(
             f"{source}: task: goal_area cannot be null, because an environment of"
             f" {scenario.category} offers no goal; give its lower and upper corner"
+        )
+    track = scenario.task.base
+    if track is not None and scenario.sample_instance("training", 0).p_WA is None:
+        raise ScenarioError(
+            f"{source}: task: a base that moves along a track needs apertures, and an environment"
+            f" of {scenario.category} has none; leave task.base out"
         )
     return scenario
 

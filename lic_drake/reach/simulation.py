@@ -31,6 +31,7 @@ class Simulation:
         self._config = config
         scene = reach_diagram.scene
         self._plant, self._arm, self._clutter = scene.plant, scene.arm, scene.clutter
+        self._base = scene.base
         self._context = reach_diagram.diagram.CreateDefaultContext()
         self._plant_context = scene.plant.GetMyMutableContextFromRoot(self._context)
         self._p_WO_first = scene.plant.GetPositions(self._plant_context, scene.clutter).reshape(
@@ -84,12 +85,19 @@ class Simulation:
         self._initialized = False
 
     def is_in_collision(self) -> bool:
-        """Tells whether anything touches now."""
-        scene_graph = self._reach_diagram.scene.scene_graph
-        query = scene_graph.get_query_output_port().Eval(
-            scene_graph.GetMyContextFromRoot(self._context)
+        """Tells whether the arm touches anything now."""
+        scene = self._reach_diagram.scene
+        query = cast(
+            QueryObject,
+            scene.scene_graph.get_query_output_port().Eval(
+                scene.scene_graph.GetMyContextFromRoot(self._context)
+            ),
         )
-        return bool(cast(QueryObject, query).HasCollisions())
+        # Objects that an earlier reach pushed together touch each other, which does not matter.
+        return bool(query.HasCollisions()) and any(
+            pair.id_A in scene.skin_links or pair.id_B in scene.skin_links
+            for pair in query.ComputePointPairPenetration()
+        )
 
     def advance_to(self, time_s: float) -> None:
         """Simulates up to a time, not yet with the control update of that instant.
@@ -131,6 +139,10 @@ class Simulation:
         plant.SetVelocities(context, self._arm, state.v)
         plant.SetPositions(context, self._clutter, state.p_WO.ravel())
         plant.SetVelocities(context, self._clutter, state.v_WO.ravel())
+
+    def set_base(self, p_WR: Vector) -> None:
+        """Puts a base that slides to p_WR, shape (3,), metres; for drawings."""
+        self._plant.SetPositions(self._plant_context, self._base, p_WR[:2])
 
     def look_around(self, q: Vector) -> None:
         """Does nothing: every movable object is awake."""

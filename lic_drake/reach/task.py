@@ -66,12 +66,16 @@ class GoalArea:
     lower: list[float] = field(default_factory=lambda: [0.45, -0.4])
     upper: list[float] = field(default_factory=lambda: [0.85, 0.4])
     step_m: float = 0.1
+    # A collection tries this many random goals in each environment; 0: the grid.
+    random_goals: int = field(default=0, metadata={"since": 2})
 
     def __post_init__(self) -> None:
         if len(self.lower) != 2 or len(self.upper) != 2:
             raise ScenarioError(f"goal area corners must be [x, y], got {self.lower}, {self.upper}")
         for name, low, high in zip("xy", self.lower, self.upper, strict=True):
             _check_range(f"goal area {name}", low, high, self.step_m)
+        if self.random_goals < 0:
+            raise ScenarioError(f"random_goals must be 0 or more, got {self.random_goals}")
 
     def grid(self) -> Vector:
         """Returns the grid goals, shape (n, 3), metres; x varies slowest."""
@@ -85,10 +89,34 @@ class GoalArea:
 
 
 @dataclass(kw_only=True)
+class BaseTrack:
+    """Where a mobile base may stand: on a segment along Wy through the origin (paper Fig. 3c).
+
+    The robot then reaches through apertures: the hand starts in the centre of one, and the start
+    line, which belongs to the robot's frame R, says which poses relative to the base are possible.
+    """
+
+    # Ends of the segment for the base's origin, metres.
+    y_min_m: float = -0.6
+    y_max_m: float = 0.6
+    # A collection tries this many random starts at each aperture of an environment.
+    starts_per_aperture: int = 5
+
+    def __post_init__(self) -> None:
+        _check_range("base track y_m", self.y_min_m, self.y_max_m, 0.1)
+        if self.starts_per_aperture < 1:
+            raise ScenarioError(
+                f"starts_per_aperture must be 1 or more, got {self.starts_per_aperture}"
+            )
+
+
+@dataclass(kw_only=True)
 class Task:
     """The start line and the goals of a scenario."""
 
     start_line: StartLine = field(default_factory=StartLine)
+    # None: the base is fixed at the origin.
+    base: BaseTrack | None = field(default=None, metadata={"since": 2})
     # None: the goal is the one that each environment offers (passage-clutter).
     goal_area: GoalArea | None = field(default_factory=GoalArea)
 

@@ -37,6 +37,9 @@ class ReachTrace:
         total_force: Sum of the taxel forces, N.
         contacts: Number of loaded taxels.
         states: The state of the scene at each sample, if it was asked for.
+        p_WR: Position of the arm's base, shape (3,), metres.
+        p_WO: Positions of the movable objects in the plane when the reach ended, shape (n, 2),
+            metres; None where it never began or they are not finite.
     """
 
     time_s: list[float] = field(default_factory=list)
@@ -46,6 +49,8 @@ class ReachTrace:
     total_force: list[float] = field(default_factory=list)
     contacts: list[int] = field(default_factory=list)
     states: list[SceneState] = field(default_factory=list)
+    p_WR: Vector = field(default_factory=lambda: np.zeros(3))
+    p_WO: Vector | None = None
 
     def append(self, time_s: float, q: Vector, p_WE: Vector, taxel_force: Vector) -> None:
         """Adds a sample; `taxel_force` has shape (num_taxels,), N."""
@@ -55,6 +60,14 @@ class ReachTrace:
         self.peak_force.append(float(taxel_force.max()))
         self.total_force.append(float(taxel_force.sum()))
         self.contacts.append(int(np.count_nonzero(taxel_force)))
+
+    def translate(self, offset: Vector) -> None:
+        """Moves all positions by an offset, shape (3,), metres."""
+        self.p_WE = [p_WE + offset for p_WE in self.p_WE]
+        self.states = [s._replace(p_WO=s.p_WO + offset[:2]) for s in self.states]
+        self.p_WR = self.p_WR + offset
+        if self.p_WO is not None:
+            self.p_WO = self.p_WO + offset[:2]
 
     @property
     def mean_force(self) -> float:

@@ -46,7 +46,7 @@ class WakingSimulation:
         self.look_around(q)
 
     def is_in_collision(self) -> bool:
-        """Tells whether anything touches now."""
+        """Tells whether the arm touches anything now."""
         return self._now.is_in_collision()
 
     def advance_to(self, time_s: float) -> None:

@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import ModelInstanceIndex
+from pydrake.multibody.tree import Frame, ModelInstanceIndex
 
 Vector = NDArray[np.float64]
 
@@ -51,8 +51,10 @@ class Arm(Protocol):
     reach_m: float
     skin: tuple[SkinCapsule, ...]
 
-    def add_to_plant(self, plant: MultibodyPlant) -> ModelInstanceIndex:
-        """Adds the arm, welded to the world, with its joint impedance."""
+    def add_to_plant(
+        self, plant: MultibodyPlant, parent: Frame | None = None
+    ) -> ModelInstanceIndex:
+        """Adds the arm with its joint impedance, its base welded to a frame, else to the world."""
         ...
 
     def solve_ik(self, x0: Vector) -> Vector | None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydrake.geometry import Capsule, SceneGraph
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import ModelInstanceIndex
+from pydrake.multibody.tree import Frame, ModelInstanceIndex
 
 from lic_drake.paths import models_dir
 from lic_drake.robots.arm import SkinCapsule, Vector
@@ -68,10 +68,12 @@ class PlanarArm:
         # Sensor, controller and stop rules ask for the same configuration, one after the other.
         self._pose = lru_cache(maxsize=1)(self._calc_pose)
 
-    def add_to_plant(self, plant: MultibodyPlant) -> ModelInstanceIndex:
-        """Adds the arm, welded to the world at the origin, without gravity."""
+    def add_to_plant(
+        self, plant: MultibodyPlant, parent: Frame | None = None
+    ) -> ModelInstanceIndex:
+        """Adds the arm without gravity, its base welded to a frame, else to the world's origin."""
         (arm,) = Parser(plant).AddModels(str(models_dir() / "planar_arm.urdf"))
-        plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("base", arm))
+        plant.WeldFrames(parent or plant.world_frame(), plant.GetFrameByName("base", arm))
         plant.set_gravity_enabled(arm, False)
         return arm
 

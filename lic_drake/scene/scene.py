@@ -16,6 +16,7 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
 from pydrake.multibody.tree import (
+    Frame,
     ModelInstanceIndex,
     PdControllerGains,
     PrismaticJoint,
@@ -38,6 +39,7 @@ CONTACT_APPROXIMATIONS = ("sap", "similar", "lagged")
 
 FIXED_COLOR = np.array([0.55, 0.25, 0.20, 1.0])
 MOVABLE_COLOR = np.array([0.95, 0.70, 0.35, 1.0])
+BASE_COLOR = np.array([0.35, 0.38, 0.45, 1.0])
 
 
 @dataclass(kw_only=True)
@@ -90,6 +92,7 @@ class Scene:
         plant: The finalized plant.
         scene_graph: Its scene graph.
         arm: Model instance of the arm.
+        base: Model instance of the mobile base, without any positions where it stands still.
         clutter: Model instance of the movable objects.
         skin_links: Skin geometry -> index into the arm's link names.
         objects: Collision geometry of each object of the instance.
@@ -98,6 +101,7 @@ class Scene:
     plant: MultibodyPlant
     scene_graph: SceneGraph
     arm: ModelInstanceIndex
+    base: ModelInstanceIndex
     clutter: ModelInstanceIndex
     skin_links: dict[GeometryId, int]
     objects: tuple[GeometryId, ...]
@@ -109,6 +113,7 @@ def add_scene(
     instance: ClutterInstance,
     config: SceneConfig,
     visuals: bool = False,
+    base_slides: bool = False,
 ) -> Scene:
     """Adds a plant with the arm and the clutter, and its scene graph, to a builder.
 
@@ -116,7 +121,9 @@ def add_scene(
     the authors' objects is larger than any contact torque, so they never spin. Their dry ground
     friction is an actuator without stiffness: a strong damper whose force saturates, which Drake
     integrates implicitly. The actuators' desired-state port must get zeros. Unless `visuals`, the
-    objects cannot be seen, which saves a quarter of the time that building takes.
+    objects cannot be seen, which saves a quarter of the time that building takes. With
+    `base_slides` the arm's base has two positions, x and y, for drawings of a robot that moves
+    between reaches; nothing drives it.
     """
     plant, scene_graph = AddMultibodyPlant(
         MultibodyPlantConfig(
@@ -128,7 +135,8 @@ def add_scene(
         builder,
     )
     plant.mutable_gravity_field().set_gravity_vector(np.zeros(3))
-    arm_instance = arm.add_to_plant(plant)
+    base = plant.AddModelInstance("base")
+    arm_instance = arm.add_to_plant(plant, _add_base(plant, base) if base_slides else None)
     skin_links = _wear_skin(plant, scene_graph, arm, arm_instance, config.contact)
     clutter = plant.AddModelInstance("clutter")
     objects: list[GeometryId] = []
@@ -156,6 +164,7 @@ def add_scene(
         plant=plant,
         scene_graph=scene_graph,
         arm=arm_instance,
+        base=base,
         clutter=clutter,
         skin_links=skin_links,
         objects=tuple(objects),
@@ -180,6 +189,21 @@ def _wear_skin(
             scene_graph.AssignRole(source, geometry, skin_properties(contact), RoleAssign.kReplace)
             skin_links[geometry] = link
     return skin_links
+
+
+def _add_base(plant: MultibodyPlant, base: ModelInstanceIndex) -> Frame:
+    """Adds a base that slides along x and y; returns the frame that carries the arm."""
+    frame = plant.world_frame()
+    for axis, direction in zip("xy", np.eye(3)[:2], strict=True):
+        body = plant.AddRigidBody(
+            f"base_{axis}", base, SpatialInertia(1.0, np.zeros(3), UnitInertia.SolidSphere(0.1))
+        )
+        plant.AddJoint(PrismaticJoint(f"base_{axis}", frame, body.body_frame(), direction))
+        frame = body.body_frame()
+    plant.RegisterVisualGeometry(
+        body, RigidTransform(np.array([-0.1, 0.0, 0.0])), Box(0.2, 0.2, 0.02), "base_visual", BASE_COLOR
+    )
+    return frame
 
 
 def _add_sliding_body(

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lic_drake.errors import RequestError
+from lic_drake.reach.starts import is_possible
 from lic_drake.select.situation import Selection, Situation
 
 Vector = NDArray[np.float64]
@@ -56,42 +57,54 @@ class RandomSelector:
         """Draws a start."""
         began = time.perf_counter()
         grid = situation.starts.grid
-        used = np.zeros(len(grid), dtype=bool)
+        used = np.zeros(len(grid.x0), dtype=bool)
         for failed in situation.failed:
-            used |= np.all(np.isclose(grid, failed), axis=1)
-        choices = grid[~used]
-        if len(choices) == 0:
+            same_pose = np.all(np.isclose(grid.x0, failed.x0), axis=1)
+            used |= same_pose & np.all(np.isclose(grid.p_WR, failed.p_WR), axis=1)
+        choices = grid.take(~used)
+        if len(choices.x0) == 0:
             raise RequestError("all discrete starts have failed; no start is left to draw")
-        return make_selection(
-            situation, choices[self.rng.integers(len(choices))], None, self.method, began
-        )
+        i = self.rng.integers(len(choices.x0))
+        return make_selection(situation, choices.x0[i], choices.p_WR[i], None, self.method, began)
 
 
 @dataclass(frozen=True, kw_only=True)
 class CostSelector:
-    """COST: the discrete start with the smallest corridor cost, away from failed ones."""
+    """COST: the discrete start with the smallest corridor cost, away from failed ones.
+
+    A mobile base adds nothing to the corridor; of equal ones that is taken whose base is nearest
+    to the goal's y, where most of the arm's length is left for the way in.
+    """
 
     method: str = "cost"
 
     def select(self, situation: Situation) -> Selection:
         """Returns the best start."""
         began = time.perf_counter()
-        grid = situation.starts.grid
-        choices = grid[situation.allowed(grid)]
-        if len(choices) == 0:
+        choices = situation.starts.grid.take(situation.allowed(situation.starts.grid))
+        if len(choices.x0) == 0:
             raise RequestError("no discrete start is left away from the failed ones")
-        best = choices[np.argmin(corridor_cost(choices, situation.p_WG))]
-        return make_selection(situation, best, None, self.method, began)
+        cost = corridor_cost(choices.x0, situation.p_WG)
+        aside = np.abs(choices.p_WR[:, 1] - situation.p_WG[1])
+        # Rounded: equal poses have equal costs but for the last digits.
+        i = np.lexsort([aside, np.round(cost, 9)])[0]
+        return make_selection(situation, choices.x0[i], choices.p_WR[i], None, self.method, began)
 
 
 def make_selection(
-    situation: Situation, x0: Vector, probability: float | None, method: str, began: float
+    situation: Situation,
+    x0: Vector,
+    p_WR: Vector,
+    probability: float | None,
+    method: str,
+    began: float,
 ) -> Selection:
     """Returns a selection after checking it with the closed-form inverse kinematics.
 
     Args:
         situation: What was asked.
-        x0: The chosen pose.
+        x0: The chosen pose, shape (3,).
+        p_WR: The chosen base, shape (2,), metres.
         probability: Its estimated probability of success, if there is an estimate.
         method: Name of the strategy.
         began: `time.perf_counter()` at the beginning of the selection.
@@ -99,11 +112,16 @@ def make_selection(
     Raises:
         RequestError: The arm cannot take the pose.
     """
-    q = situation.starts.arm.solve_ik(x0)
-    if q is None or not situation.starts.contains(x0):
-        raise RequestError(f"the arm cannot start at {np.round(x0, 4).tolist()}")
+    starts = situation.starts
+    q = starts.poses.arm.solve_ik(x0 - [*p_WR, 0.0])
+    if q is None or not is_possible(starts, x0, p_WR):
+        raise RequestError(
+            f"the arm cannot start at {np.round(x0, 4).tolist()} from a base at"
+            f" {np.round(p_WR, 4).tolist()}"
+        )
     return Selection(
         x0=x0,
+        p_WR=p_WR,
         q=q,
         probability=probability,
         method=method,

@@ -1,4 +1,4 @@
-"""LIC-1: the start with the highest estimated probability of success (paper III-A, III-E)."""
+"""LIC-1 and LIC-2: the start with the highest estimated probability of success (paper III)."""
 
 import time
 
@@ -7,12 +7,13 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from lic_drake.errors import RequestError
-from lic_drake.estimate.estimator import SuccessEstimator
-from lic_drake.estimate.features import FeatureMap
+from lic_drake.estimate.checks import EstimateError
+from lic_drake.reach.starts import InitialConditions, Region, is_possible
 from lic_drake.robots.planar import PlanarArm
 from lic_drake.select.baselines import make_selection
+from lic_drake.select.objective import Objective, SuccessModel
 from lic_drake.select.program import StartProgram
-from lic_drake.select.situation import Selection, Situation
+from lic_drake.select.situation import FailedReach, Selection, Situation
 
 Vector = NDArray[np.float64]
 
@@ -23,6 +24,9 @@ NUM_SOLVES = 6
 class LicSelector:
     """Selects by optimising an estimator with a MathematicalProgram from many starts.
 
+    A first attempt is chosen with LIC-1, a further one with LIC-2, which knows how the attempts
+    before it failed. Without LIC-2, further attempts are LIC-1's best away from the failed ones.
+
     The answer is never worse than the best candidate seen, whatever the solver reports, and is
     checked with the closed-form inverse kinematics.
     """
@@ -30,15 +34,23 @@ class LicSelector:
     def __init__(
         self,
         arm: PlanarArm,
-        estimator: SuccessEstimator,
-        features: FeatureMap,
+        first: SuccessModel,
+        second: SuccessModel | None = None,
         method: str = "lic",
     ) -> None:
+        """Sets up a selector.
+
+        Args:
+            arm: The robot.
+            first: LIC-1's fitted model.
+            second: LIC-2's, if there is one.
+            method: Name for the selections.
+        """
         self.method = method
+        self.first = first
+        self.second = second
         self._arm = arm
-        self.estimator = estimator
-        self._features = features
-        self._program = StartProgram(arm.kinematics, estimator, features)
+        self._program = StartProgram(arm.kinematics)
 
     def select(self, situation: Situation) -> Selection:
         """Returns the best start found.
@@ -47,87 +59,131 @@ class LicSelector:
             RequestError: No start is left away from the failed ones.
         """
         began = time.perf_counter()
-        candidates = self._candidates(situation)
-        values = self.evaluate(situation.p_WG, candidates)
-        order = np.argsort(-values, kind="stable")
-        best, best_value = candidates[order[0]], float(values[order[0]])
-        for guess in candidates[order[:NUM_SOLVES]]:
-            x0 = self._improve(situation, guess)
-            if x0 is None:
-                continue
-            value = float(self.evaluate(situation.p_WG, x0[None])[0])
-            if value > best_value:
-                best, best_value = x0, value
-        probability = float(np.clip(best_value, 0.0, 1.0))
-        return make_selection(situation, best, probability, self.method, began)
-
-    def evaluate(self, p_WG: Vector, x0: Vector) -> Vector:
-        """Returns the unclipped estimate at start poses, shape (n, 3) -> (n,)."""
-        Z = self._features.join(p_WG, x0)
-        return np.array([self.estimator.value_and_gradient(z)[0] for z in Z])
-
-    def _candidates(self, situation: Situation) -> Vector:
-        """Returns the library's own starts and a lattice, without those near failed starts."""
-        candidates = np.vstack([situation.starts.grid, situation.starts.lattice])
-        candidates = candidates[situation.allowed(candidates)]
-        if len(candidates) == 0:
+        objective, regions = self._pose(situation)
+        candidates = situation.starts.grid.join(situation.starts.lattice)
+        if not objective.failed:
+            candidates = candidates.take(situation.allowed(candidates))
+        if len(candidates.x0) == 0:
             raise RequestError("no start is left away from the failed ones")
-        return candidates
+        values = objective.values(candidates)
+        order = np.argsort(-values, kind="stable")
+        best = candidates.take(order[:1])
+        best_value = float(values[order[0]])
+        for i in order[:NUM_SOLVES]:
+            improved = self._improve(
+                situation, objective, regions, candidates.x0[i], candidates.p_WR[i]
+            )
+            if improved is None:
+                continue
+            value = float(objective.values(improved)[0])
+            if value > best_value:
+                best, best_value = improved, value
+        probability = float(np.clip(best_value, 0.0, 1.0))
+        return make_selection(situation, best.x0[0], best.p_WR[0], probability, self.method, began)
 
-    def _improve(self, situation: Situation, guess: Vector) -> Vector | None:
-        """Returns the pose that the optimisation reaches from a guess, None if impossible."""
-        q = self._arm.solve_ik(guess)
+    def objective(self, situation: Situation) -> Objective:
+        """Returns what is maximised in a situation."""
+        return self._pose(situation)[0]
+
+    def _pose(self, situation: Situation) -> tuple[Objective, tuple[Region, ...]]:
+        """Returns the objective and where it is maximised."""
+        seen = self._observable(situation.failed)
+        if self.second is not None and seen:
+            objective = Objective(model=self.second, p_WG=situation.p_WG, failed=seen)
+            return objective, situation.starts.regions
+        return Objective(model=self.first, p_WG=situation.p_WG), situation.free_regions()
+
+    def _observable(self, failed: tuple[FailedReach, ...]) -> tuple[FailedReach, ...]:
+        """Returns the failures that show all that LIC-2 asks for: those that began at all."""
+        if self.second is None:
+            return ()
+        seen = []
+        for reach in failed:
+            try:
+                self.second.features.observation(reach.shown)
+            except EstimateError:
+                continue
+            seen.append(reach)
+        return tuple(seen)
+
+    def _improve(
+        self,
+        situation: Situation,
+        objective: Objective,
+        regions: tuple[Region, ...],
+        x0: Vector,
+        p_WR: Vector,
+    ) -> InitialConditions | None:
+        """Returns where the optimisation ends from a candidate, None if that is not possible."""
+        region = _region_of(regions, x0, p_WR)
+        q = self._arm.solve_ik(x0 - [*p_WR, 0.0])
         if q is None:
             return None
-        line = situation.starts.line
-        lower, upper = line.lower.copy(), line.upper.copy()
-        lower[1], upper[1] = next(
-            (low, high)
-            for low, high in situation.free_intervals()
-            if low - 1e-5 <= guess[1] <= high + 1e-5
-        )
-        x0 = self._program.solve(situation.p_WG, lower, upper, guess, q)
-        x0 = np.clip(x0, lower, upper)
-        return x0 if situation.starts.contains(x0) else None
+        x0, p_WR = self._program.solve(objective, region, x0, p_WR, q)
+        x0 = np.clip(x0, region.lower, region.upper)
+        p_WR = np.clip(p_WR, region.base_lower, region.base_upper)
+        if not is_possible(situation.starts, x0, p_WR):
+            return None
+        return InitialConditions(x0[None], p_WR[None])
 
 
 class LbfgsbSelector(LicSelector):
     """The paper's own optimiser: L-BFGS-B, which knows bounds only (III-E).
 
-    The orientations that the joint limits leave depend on the position, so it works on
-    (y, s) with phi = low(y) + s (high(y) - low(y)) and s from 0 to 1.
+    The orientations that the joint limits leave depend on the hand's position y relative to the
+    base, so it works on (y, s) with phi = low(y) + s (high(y) - low(y)) and s from 0 to 1.
     """
 
-    def _improve(self, situation: Situation, guess: Vector) -> Vector | None:
-        starts = situation.starts
-        low, high = next(
-            (low, high)
-            for low, high in situation.free_intervals()
-            if low - 1e-5 <= guess[1] <= high + 1e-5
-        )
+    def _improve(
+        self,
+        situation: Situation,
+        objective: Objective,
+        regions: tuple[Region, ...],
+        x0: Vector,
+        p_WR: Vector,
+    ) -> InitialConditions | None:
+        poses = situation.starts.poses
+        region = _region_of(regions, x0, p_WR)
+        # Moving the base to the left moves the hand to the right of it.
+        y_low = region.lower[1] - region.base_upper[1]
+        y_high = region.upper[1] - region.base_lower[1]
+        base_moves = region.base_lower[1] < region.base_upper[1]
 
-        def pose(y_s: Vector) -> tuple[Vector, Vector]:
-            """Returns x0 and its derivative by (y, s), shape (3, 2)."""
-            ends, slopes = starts.phi_range(y_s[0])
+        def condition(y_s: Vector) -> tuple[Vector, Vector, Vector, Vector]:
+            """Returns x0 and the base, and their derivatives by (y, s), (3, 2) and (2, 2)."""
+            ends, slopes = poses.phi_range(y_s[0])
             width, d_width = ends[1] - ends[0], slopes[1] - slopes[0]
-            x0 = np.array([starts.line.x_m, y_s[0], ends[0] + y_s[1] * width])
-            by_y_s = np.array([[0.0, 0.0], [1.0, 0.0], [slopes[0] + y_s[1] * d_width, width]])
-            return x0, by_y_s
+            phi = ends[0] + y_s[1] * width
+            by_y = 0.0 if base_moves else 1.0
+            y_base = x0[1] - y_s[0] if base_moves else p_WR[1]
+            return (
+                np.array([x0[0], y_base + y_s[0], phi]),
+                np.array([p_WR[0], y_base]),
+                np.array([[0.0, 0.0], [by_y, 0.0], [slopes[0] + y_s[1] * d_width, width]]),
+                np.array([[0.0, 0.0], [by_y - 1.0, 0.0]]),
+            )
 
         def cost(y_s: Vector) -> tuple[float, Vector]:
-            x0, by_y_s = pose(y_s)
-            z = self._features.join(situation.p_WG, x0)
-            value, by_z = self.estimator.value_and_gradient(z)
-            return -value, -self._features.gradient_by_x0(by_z) @ by_y_s
+            pose, base, pose_by, base_by = condition(y_s)
+            value, by_x0, by_b0 = objective.value_and_gradient(pose, base)
+            return -value, -(by_x0 @ pose_by + by_b0 @ base_by)
 
-        ends, _ = starts.phi_range(guess[1])
-        share = (guess[2] - ends[0]) / max(ends[1] - ends[0], 1e-9)
+        y = x0[1] - p_WR[1]
+        ends, _ = poses.phi_range(y)
+        share = (x0[2] - ends[0]) / max(ends[1] - ends[0], 1e-9)
         result = minimize(
             cost,
-            np.array([guess[1], np.clip(share, 0.0, 1.0)]),
+            np.array([np.clip(y, y_low, y_high), np.clip(share, 0.0, 1.0)]),
             jac=True,
             method="L-BFGS-B",
-            bounds=[(low, high), (0.0, 1.0)],
+            bounds=[(y_low, y_high), (0.0, 1.0)],
         )
-        x0, _ = pose(result.x)
-        return x0 if starts.contains(x0) else None
+        x0, p_WR, _, _ = condition(result.x)
+        if not is_possible(situation.starts, x0, p_WR):
+            return None
+        return InitialConditions(x0[None], p_WR[None])
+
+
+def _region_of(regions: tuple[Region, ...], x0: Vector, p_WR: Vector) -> Region:
+    """Returns the region that holds an initial condition, up to the rounding of grids."""
+    return next(region for region in regions if region.holds(x0, p_WR, 1e-5))

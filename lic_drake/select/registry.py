@@ -1,17 +1,21 @@
 """The known selection strategies by name."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lic_drake.errors import RequestError
-from lic_drake.estimate.features import PLANAR_LIC1
+from lic_drake.estimate.categories import features_of
+from lic_drake.estimate.features import FeatureMap
 from lic_drake.estimate.registry import estimator_names, make_estimator
+from lic_drake.experience.second_reach import pair_reaches
 from lic_drake.robots.planar import PlanarArm
 from lic_drake.select.baselines import CostSelector, RandomSelector
 from lic_drake.select.lic import LicSelector
+from lic_drake.select.objective import SuccessModel
 from lic_drake.select.situation import Selection, Situation
 
 
@@ -28,9 +32,46 @@ class Selector(Protocol):
         ...
 
 
+@dataclass(frozen=True, kw_only=True)
+class FallbackSelector:
+    """One strategy for the first attempt and another one for all further ones."""
+
+    first: Selector
+    later: Selector
+    method: str
+
+    def select(self, situation: Situation) -> Selection:
+        """Chooses an initial condition."""
+        return (self.later if situation.failed else self.first).select(situation)
+
+
 def method_names() -> tuple[str, ...]:
-    """Returns the names of all strategies: the baselines and one for each estimator."""
-    return ("rnd", "cost", *estimator_names())
+    """Returns the names of all simple strategies.
+
+    They are the baselines and, for each estimator, LIC (LIC-1, then LIC-2) under its name and
+    LIC-1 for all attempts under its name with a 1. FIRST>LATER is a strategy, too.
+    """
+    return ("rnd", "cost", *estimator_names(), *(f"{name}1" for name in estimator_names()))
+
+
+def split_method(method: str) -> tuple[str, str | None]:
+    """Returns the strategies of the first attempt and, where another one follows, of the later."""
+    first, arrow, later = method.partition(">")
+    return first, later if arrow else None
+
+
+def check_method(method: str) -> None:
+    """Refuses unknown strategies.
+
+    Raises:
+        RequestError: The strategy is unknown.
+    """
+    for part in split_method(method):
+        if part is not None and part not in method_names():
+            raise RequestError(
+                f"unknown method {method!r}; choose one of {', '.join(method_names())}, or one for"
+                " the first attempt and one for later ones, as in gp>cost"
+            )
 
 
 def needs_library(method: str) -> bool:
@@ -39,32 +80,62 @@ def needs_library(method: str) -> bool:
     Raises:
         RequestError: The strategy is unknown.
     """
-    if method not in method_names():
-        raise RequestError(f"unknown method {method!r}; choose one of {', '.join(method_names())}")
-    return method not in ("rnd", "cost")
+    check_method(method)
+    return any(part not in ("rnd", "cost", None) for part in split_method(method))
 
 
 def make_selector(
     method: str,
     arm: PlanarArm,
-    columns: Mapping[str, NDArray[Any]] | None,
-    rng: np.random.Generator,
+    columns: Mapping[str, NDArray[Any]] | None = None,
+    rng: np.random.Generator | None = None,
+    category: str = "cylinder-clutter",
 ) -> Selector:
     """Returns a strategy, fitted to a library if it learns from one.
 
     Args:
-        method: One of `method_names()`.
+        method: See `method_names`.
         arm: The robot.
         columns: Columns of the experience library; not needed by the baselines.
-        rng: Source of draws for RND.
+        rng: Source of draws for RND; by default always the same ones.
+        category: Clutter category, which says what LIC observes.
 
     Raises:
         RequestError: The strategy is unknown, or has no library to learn from.
     """
+    check_method(method)
+    first, later = split_method(method)
+    if later is not None:
+        return FallbackSelector(
+            first=make_selector(first, arm, columns, rng, category),
+            later=make_selector(later, arm, columns, rng, category),
+            method=method,
+        )
     if not needs_library(method):
+        rng = np.random.default_rng(0) if rng is None else rng
         return RandomSelector(rng=rng) if method == "rnd" else CostSelector()
     if columns is None:
         raise RequestError(f"method {method!r} needs an experience library to learn from")
-    rows = PLANAR_LIC1.rows(columns)
-    estimator = make_estimator(method).fit(rows.Z, rows.f, rows.environment)
-    return LicSelector(arm, estimator, PLANAR_LIC1, method=method)
+    features, only_first = features_of(category), method not in estimator_names()
+    estimator = method[:-1] if only_first else method
+    return LicSelector(
+        arm,
+        fit_model(estimator, features.first, columns),
+        None if only_first else fit_model(estimator, features.second, pair_reaches(columns)),
+        method=method,
+    )
+
+
+def fit_model(
+    estimator: str, features: FeatureMap, columns: Mapping[str, NDArray[Any]]
+) -> SuccessModel:
+    """Returns an estimator fitted to the columns of a library.
+
+    Args:
+        estimator: Its name, see `estimator_names`.
+        features: What z is made of.
+        columns: Of a library D1, or the pairs D2 where the features observe a first reach.
+    """
+    rows = features.rows(columns)
+    fitted = make_estimator(estimator, features).fit(rows.Z, rows.f, rows.environment)
+    return SuccessModel(estimator=fitted, features=features)

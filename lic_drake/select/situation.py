@@ -1,144 +1,89 @@
-"""What is known before a reach, and which start poses are possible in it."""
+"""What is known before a reach, and what was chosen."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lic_drake.errors import RequestError
-from lic_drake.reach.task import StartLine
-from lic_drake.robots.planar import PlanarArm
+from lic_drake.reach.request import ReachRecord
+from lic_drake.reach.starts import InitialConditions, Region, Starts
 
 Vector = NDArray[np.float64]
 
 RETRY_DISTANCE_M = 0.1
-"""A second attempt starts further than this from the first along the start line: the "local
+"""A second attempt of COST starts further than this from the first along y: the "local
 neighborhood" of paper VI-A, whose size it does not state; one grid step."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class StartSet:
-    """The start poses x0 = (x, y, phi) that an arm can take on a start line (Eq. 4).
+class FailedReach:
+    """What a reach that failed showed (paper III-C), all in W.
 
-    A pose is possible when it lies on the line within the line's bounds and the arm reaches it
-    within its joint limits. With phi within +-90 degrees the whole last link is then behind the
-    line, in the open space outside the clutter.
+    Attributes:
+        x0: Hand pose (x, y, phi) that it began with, shape (3,), metres and radians.
+        p_WR: Its base, shape (2,), metres.
+        shown: Values that an observation o may be made of, by the names of the records' columns:
+            start_x, start_y, start_phi and, if it began at all, final_x, final_y, final_phi,
+            final_vx, final_vy.
     """
 
-    arm: PlanarArm
-    line: StartLine
+    x0: Vector
+    p_WR: Vector
+    shown: Mapping[str, float]
 
-    @cached_property
-    def grid(self) -> Vector:
-        """The discrete starts of the experience library, shape (n, 3), metres and radians."""
-        return self.line.grid(self.arm)
+    @classmethod
+    def from_start(cls, x0: Vector, p_WR: Vector | None = None) -> Self:
+        """Returns a failure of which nothing but its initial condition is known."""
+        shown = dict(zip(("start_x", "start_y", "start_phi"), x0.tolist(), strict=True))
+        return cls(x0=x0, p_WR=np.zeros(2) if p_WR is None else p_WR, shown=shown)
 
-    @cached_property
-    def lattice(self) -> Vector:
-        """A denser set of possible starts, 0.025 m and 7.5 degrees apart, shape (n, 3)."""
-        return self.scan(33, 25)
-
-    def scan(self, num_y: int, num_phi: int) -> Vector:
-        """Returns the possible poses of a lattice over the line's bounds, shape (n, 3)."""
-        y = np.linspace(self.line.lower[1], self.line.upper[1], num_y)
-        phi = np.linspace(self.line.lower[2], self.line.upper[2], num_phi)
-        poses = [np.array([self.line.x_m, yi, phi_i]) for yi in y for phi_i in phi]
-        return np.array([x0 for x0 in poses if self.arm.solve_ik(x0) is not None])
-
-    def phi_range(self, y: float) -> tuple[Vector, Vector]:
-        """Returns the ends (low, high) of the possible orientations at y, and their slopes.
-
-        Interpolated between positions 5 mm apart and kept 1e-3 rad inside.
-
-        Args:
-            y: Position on the line, metres.
-
-        Returns:
-            The ends, shape (2,), radians, and their derivatives by y, shape (2,), rad/m.
-        """
-        positions, ends = self._phi_ends
-        k = int(np.clip(np.searchsorted(positions, y) - 1, 0, len(positions) - 2))
-        slopes = (ends[k + 1] - ends[k]) / (positions[k + 1] - positions[k])
-        return ends[k] + slopes * (y - positions[k]), slopes
-
-    @cached_property
-    def _phi_ends(self) -> tuple[Vector, Vector]:
-        """Positions, shape (n,), and the ends of their longest run of orientations, (n, 2)."""
-        line = self.line
-        count = max(2, round((line.upper[1] - line.lower[1]) / 0.005) + 1)
-        coarse = np.linspace(line.lower[2], line.upper[2], 181)
-        positions, ends = [], []
-        for y in np.linspace(line.lower[1], line.upper[1], count):
-            possible = np.array([self._possible(y, phi) for phi in coarse])
-            if not np.any(possible):
-                continue
-            edges = np.flatnonzero(np.diff(np.concatenate([[False], possible, [False]])))
-            runs = edges.reshape(-1, 2)
-            first, last = runs[np.argmax(runs[:, 1] - runs[:, 0])] - [0, 1]
-            low = coarse[0] if first == 0 else self._edge(y, coarse[first], coarse[first - 1])
-            high = coarse[-1] if last == 180 else self._edge(y, coarse[last], coarse[last + 1])
-            positions.append(y)
-            # A margin for the error of interpolating between positions.
-            ends.append([low + 1e-3, high - 1e-3])
-        return np.array(positions), np.array(ends)
-
-    def _possible(self, y: float, phi: float) -> bool:
-        return self.arm.solve_ik(np.array([self.line.x_m, y, phi])) is not None
-
-    def _edge(self, y: float, possible: float, impossible: float) -> float:
-        """Returns the last possible orientation on the way to an impossible one."""
-        while abs(possible - impossible) > 1e-6:
-            middle = 0.5 * (possible + impossible)
-            if self._possible(y, middle):
-                possible = middle
-            else:
-                impossible = middle
-        return possible
-
-    def contains(self, x0: Vector, tolerance: float = 1e-6) -> bool:
-        """Tells whether the arm can start at x0; uses the closed-form inverse kinematics."""
-        inside = np.all(x0 >= self.line.lower - tolerance) and np.all(
-            x0 <= self.line.upper + tolerance
-        )
-        return bool(inside) and self.arm.solve_ik(x0) is not None
+    @classmethod
+    def from_record(cls, record: ReachRecord) -> Self:
+        """Returns what a record says of a failed reach."""
+        names = ("start_x", "start_y", "start_phi", "final_x", "final_y", "final_phi")
+        shown = {name: getattr(record, name) for name in (*names, "final_vx", "final_vy")}
+        return cls(x0=record.x0, p_WR=np.array([record.base_x, record.base_y]), shown=shown)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Situation:
-    """The goal, the possible starts, and where the last attempt started if it failed.
+    """The goal, the possible starts, and the attempts at the goal that failed.
 
     Attributes:
         p_WG: Goal, shape (3,), metres.
-        starts: The possible start poses.
-        failed: Start poses of failed attempts, each (x, y, phi).
+        starts: The possible initial conditions.
+        failed: Failed attempts in this environment, in their order.
     """
 
     p_WG: Vector
-    starts: StartSet
-    failed: tuple[Vector, ...] = ()
+    starts: Starts
+    failed: tuple[FailedReach, ...] = ()
 
     def __post_init__(self) -> None:
         if self.p_WG.shape != (3,) or not np.all(np.isfinite(self.p_WG)):
             raise RequestError(f"a goal is three finite numbers in metres, got {self.p_WG}")
 
-    def allowed(self, x0: Vector) -> NDArray[np.bool_]:
-        """Tells which poses, shape (n, 3), are far enough from all failed starts, shape (n,)."""
-        far = np.ones(len(x0), dtype=bool)
+    def allowed(self, conditions: InitialConditions) -> NDArray[np.bool_]:
+        """Tells which of n initial conditions are far enough from all failed ones, shape (n,)."""
+        far = np.ones(len(conditions.x0), dtype=bool)
         for failed in self.failed:
-            far &= np.abs(x0[:, 1] - failed[1]) > RETRY_DISTANCE_M + 1e-9
+            far &= np.abs(conditions.x0[:, 1] - failed.x0[1]) > RETRY_DISTANCE_M + 1e-9
         return far
 
-    def free_intervals(self) -> list[tuple[float, float]]:
-        """Returns the parts of the start line, (y_min, y_max), away from all failed starts."""
-        intervals = [(float(self.starts.line.lower[1]), float(self.starts.line.upper[1]))]
+    def free_regions(self) -> tuple[Region, ...]:
+        """Returns the parts of the starts' regions that are away from all failed attempts."""
+        regions = self.starts.regions
         margin = RETRY_DISTANCE_M + 1e-6
         for failed in self.failed:
+            y = failed.x0[1]
             cut = []
-            for low, high in intervals:
-                cut += [(low, min(high, failed[1] - margin)), (max(low, failed[1] + margin), high)]
-            intervals = [(low, high) for low, high in cut if low <= high]
-        return intervals
+            for region in regions:
+                cut += [_clip(region, upper=y - margin), _clip(region, lower=y + margin)]
+            regions = tuple(region for region in cut if region.lower[1] <= region.upper[1])
+        return regions
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,7 +91,8 @@ class Selection:
     """A chosen initial condition.
 
     Attributes:
-        x0: Hand pose (x, y, phi), metres and radians.
+        x0: Hand pose (x, y, phi) in W, metres and radians.
+        p_WR: Base, shape (2,), metres.
         q: Joint angles that take it, shape (m,), radians.
         probability: Estimated probability of success; None for strategies without an estimate.
         method: Name of the strategy.
@@ -154,7 +100,15 @@ class Selection:
     """
 
     x0: Vector
+    p_WR: Vector
     q: Vector
     probability: float | None
     method: str
     seconds: float
+
+
+def _clip(region: Region, lower: float = -np.inf, upper: float = np.inf) -> Region:
+    """Returns a region without what lies outside a range of y."""
+    low, high = region.lower.copy(), region.upper.copy()
+    low[1], high[1] = max(low[1], lower), min(high[1], upper)
+    return Region(lower=low, upper=high, base_lower=region.base_lower, base_upper=region.base_upper)

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.reach.environment import Environment, simulate
 from lic_drake.reach.request import ReachRequest
-from lic_drake.reach.rollout import Environment, simulate
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.trace import ReachResult
 from peers.mujoco_scene import MujocoConfig

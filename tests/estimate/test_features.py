@@ -3,6 +3,7 @@ import pytest
 
 from lic_drake.estimate.checks import EstimateError
 from lic_drake.estimate.features import PLANAR_LIC1, FeatureMap
+from lic_drake.experience.second_reach import SHOWN
 
 
 @pytest.fixture
@@ -74,3 +75,94 @@ def test_the_gradient_by_x0_is_the_derivative_through_join() -> None:
 def test_features_that_make_no_sense_are_refused(goal, start) -> None:
     with pytest.raises(EstimateError, match="features must be some of"):
         FeatureMap(goal=goal, start=start)
+
+
+SECOND = FeatureMap(
+    goal=("goal_x", "goal_y"),
+    observed=(
+        "first_start_y",
+        "first_start_phi",
+        "first_final_x",
+        "first_final_y",
+        "first_final_phi",
+        "first_final_vx",
+        "first_final_vy",
+    ),
+    start=("start_x", "start_y", "start_phi"),
+)
+
+
+@pytest.fixture
+def pairs(columns) -> dict[str, np.ndarray]:
+    shown = {f"first_{name}": np.array([i + 0.5, -i]) for i, name in enumerate(SHOWN)}
+    base = {"base_x": np.array([0.25, 0.0]), "base_y": np.array([-0.5, 1.0])}
+    return columns | shown | base
+
+
+def test_the_situation_is_goal_and_observation(pairs) -> None:
+    Z = SECOND.rows(pairs).Z
+    assert SECOND.names == SECOND.goal + SECOND.observed + SECOND.start
+    assert Z[:, SECOND.situation].shape == (2, 9)
+    assert Z[:, SECOND.decision].shape == (2, 3)
+
+
+def test_positions_are_told_from_the_base_and_angles_and_velocities_are_not(pairs) -> None:
+    moved = SECOND.rows(pairs).Z
+    del pairs["base_x"], pairs["base_y"]
+    by_column = dict(zip(SECOND.names, (SECOND.rows(pairs).Z - moved).T, strict=True))
+    for name, difference in by_column.items():
+        expected = {"x": [0.25, 0.0], "y": [-0.5, 1.0]}.get(name.rsplit("_", 1)[1], [0.0, 0.0])
+        np.testing.assert_allclose(difference, expected, err_msg=name)
+
+
+def test_a_situation_moved_with_its_base_has_the_same_features(pairs) -> None:
+    before = SECOND.rows(pairs).Z
+    for name in list(pairs):
+        if name.endswith(("_x", "_y")):
+            pairs[name] = pairs[name] + (0.3 if name.endswith("_x") else -0.7)
+    np.testing.assert_allclose(SECOND.rows(pairs).Z, before)
+
+
+def test_joining_with_an_observation_gives_the_row_of_the_pair(pairs) -> None:
+    base = np.array([pairs["base_x"][0], pairs["base_y"][0]])
+    first = {name: pairs[f"first_{name}"][0] for name in SHOWN}
+    observed = SECOND.observation(first, base)
+    p_RG = np.array([pairs[f"goal_{axis}"][0] for axis in "xyz"]) - [*base, 0.0]
+    x0 = np.array([pairs[f"start_{name}"][0] for name in ("x", "y", "phi")]) - [*base, 0.0]
+    np.testing.assert_allclose(SECOND.join(p_RG, x0, observed), SECOND.rows(pairs).Z[0])
+    many = SECOND.join(p_RG, np.tile(x0, (4, 2, 1)), observed)
+    assert many.shape == (4, 2, 12)
+    np.testing.assert_allclose(many[3, 1], SECOND.rows(pairs).Z[0])
+
+
+def test_the_gradient_by_the_base_is_the_derivative_with_the_world_standing_still() -> None:
+    rng = np.random.default_rng(0)
+    weight = rng.normal(size=len(SECOND.names))
+    p_WG, x0, base = rng.normal(size=3), rng.normal(size=3), rng.normal(size=2)
+    first = dict(zip(SHOWN, rng.normal(size=len(SHOWN)), strict=True))
+
+    def value(b0):
+        shift = [*b0, 0.0]
+        return weight @ SECOND.join(p_WG - shift, x0 - shift, SECOND.observation(first, b0))
+
+    numeric = [(value(base + step) - value(base - step)) / 2e-3 for step in 1e-3 * np.eye(2)]
+    np.testing.assert_allclose(SECOND.gradient_by_base(weight), numeric, atol=1e-9)
+    np.testing.assert_array_equal(PLANAR_LIC1.gradient_by_base(np.arange(1.0, 5.0)), [-1.0, -5.0])
+
+
+def test_a_first_reach_that_never_began_shows_nothing() -> None:
+    first = dict.fromkeys(SHOWN, 0.1) | {"final_x": np.nan}
+    with pytest.raises(EstimateError, match=r"first_final_x.*never began"):
+        SECOND.observation(first)
+    assert PLANAR_LIC1.observation({}).shape == (0,)
+
+
+@pytest.mark.parametrize("observed", [None, np.zeros(3)])
+def test_joining_without_the_observation_is_refused(observed) -> None:
+    with pytest.raises(EstimateError, match="7 observed features"):
+        SECOND.join(np.zeros(3), np.zeros(3), observed)
+
+
+def test_observed_features_are_columns_of_the_first_reach() -> None:
+    with pytest.raises(EstimateError, match="observed features must be some of first_start_x"):
+        FeatureMap(goal=("goal_x",), start=("start_y",), observed=("final_x",))

@@ -44,6 +44,7 @@ def test_the_local_model_is_the_one_fitted_on_the_rows_of_the_nearest_goals(worl
         local.predict(queries).probability, expected.predict(queries).probability
     )
     np.testing.assert_allclose(local.predict(queries).spread, expected.predict(queries).spread)
+    np.testing.assert_allclose(local.values(queries), expected.values(queries))
     value, gradient = local.value_and_gradient(queries[0])
     assert value == pytest.approx(expected.value_and_gradient(queries[0])[0])
     np.testing.assert_allclose(gradient, expected.value_and_gradient(queries[0])[1])

@@ -39,6 +39,18 @@ def test_repeated_rows_count_as_one_neighbour_each_time(world) -> None:
     )
 
 
+def test_given_other_rows_scales_and_bandwidth_stay(scattered) -> None:
+    ours = NearestNeighbours(neighbours=20).fit(scattered.Z, scattered.f, scattered.environment)
+    some = np.arange(0, 60, 2)
+    other = ours.conditioned_on(scattered.Z[some], scattered.f[some])
+    scale = scattered.Z.std(axis=0)
+    theirs = KNeighborsRegressor(20, weights=_gaussian(ours.bandwidth)).fit(
+        scattered.Z[some] / scale, scattered.f[some]
+    )
+    queries = scattered.Z[:20] + 0.02
+    np.testing.assert_allclose(other.values(queries), theirs.predict(queries / scale), rtol=1e-9)
+
+
 def test_far_from_all_rows_the_nearest_decide() -> None:
     ours = NearestNeighbours(bandwidth=0.01).fit([[0.0], [1.0]], [0, 1])
     np.testing.assert_array_equal(ours.predict([[-50.0], [50.0]]).probability, [0.0, 1.0])

@@ -48,6 +48,18 @@ def test_every_estimator_learns_a_known_surface(world, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("size", [60, 20_000])
+def test_many_values_are_those_of_single_queries(world, scattered, name: str, size: int) -> None:
+    library = scattered if size == 60 else world.library(environments=3)
+    estimator = make_estimator(name).fit(library.Z, library.f, library.environment)
+    rng = np.random.default_rng(0)
+    Z = rng.uniform([0.4, -0.4, -0.4, -1.0], [0.8, 0.4, 0.4, 1.5], (12, 4))
+    Z[1::3, PLANAR_LIC1.situation] = Z[0, PLANAR_LIC1.situation]
+    single = [estimator.value_and_gradient(z)[0] for z in Z]
+    np.testing.assert_allclose(estimator.values(Z), single, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_fitting_twice_on_the_same_rows_gives_the_same_estimate(scattered, name: str) -> None:
     z = scattered.Z[7] + 0.01
     first, second = (

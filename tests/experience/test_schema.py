@@ -152,7 +152,7 @@ def _retyped(table: pa.Table) -> pa.Table:
     ("change", "message"),
     [
         (_foreign, "is not part of an experience library"),
-        (_newer, "has schema version 99, written by lic_drake 0.1.0; .* reads version 1"),
+        (_newer, "has schema version 99, written by lic_drake 0.1.0; .* reads versions up to 2"),
         (_narrower, r"has other columns than this lic_drake writes \(peak_force\)"),
         (_retyped, r"has other columns than this lic_drake writes \(environment\)"),
     ],

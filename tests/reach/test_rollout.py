@@ -18,7 +18,8 @@ from worlds import box, cylinder, make_clutter
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.reach import rollout as dut
 from lic_drake.reach.request import ReachRecord, ReachRequest
-from lic_drake.reach.rollout import Environment, make_record, run_reach
+from lic_drake.reach.environment import Environment
+from lic_drake.reach.rollout import make_record, run_reach
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.trace import ReachResult, ReachTrace
 
@@ -29,9 +30,9 @@ X0 = np.array(reach_request(FREE).start)
 @pytest.fixture(autouse=True)
 def fresh_process() -> Iterator[None]:
     """Forgets the environment that an earlier test left."""
-    dut._recent.clear()
+    dut._environments.clear()
     yield
-    dut._recent.clear()
+    dut._environments.clear()
 
 
 def in_clutter(instance: ClutterInstance, goal: tuple[float, float] = (0.6, 0.1), **values: Any):
@@ -185,7 +186,7 @@ def requests() -> list[ReachRequest]:
 
 
 def alone(request: ReachRequest) -> ReachRecord:
-    dut._recent.clear()
+    dut._environments.clear()
     return run_reach(request)
 
 
@@ -217,7 +218,7 @@ def test_only_the_last_environment_is_kept() -> None:
     assert dut.environment_of(reach_request(scenario, (0.5, 0.0), environment=0)) is first
     second = dut.environment_of(reach_request(scenario, environment=1))
     assert second is not first
-    assert list(dut._recent.values()) == [second]
+    assert list(dut._environments.values()) == [second]
 
 
 def test_another_scenario_or_stream_is_another_environment() -> None:

@@ -21,9 +21,9 @@ FREE = free_space()
 @pytest.fixture(autouse=True)
 def fresh_process() -> Iterator[None]:
     """Forgets the environment that an earlier test left."""
-    dut._recent.clear()
+    dut._environments.clear()
     yield
-    dut._recent.clear()
+    dut._environments.clear()
 
 
 class Failing(Simulator):

@@ -9,7 +9,8 @@ from worlds import box, cylinder, make_clutter
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.evaluate.batch import random_requests
 from lic_drake.reach import rollout
-from lic_drake.reach.rollout import Environment, run_reach
+from lic_drake.reach.environment import Environment
+from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.trace import ReachResult
 from lic_drake.reach.waking import WakingSimulation
@@ -21,9 +22,9 @@ P_WG = np.array([0.7, 0.0, 0.0])
 
 @pytest.fixture(autouse=True)
 def fresh_process() -> Iterator[None]:
-    rollout._recent.clear()
+    rollout._environments.clear()
     yield
-    rollout._recent.clear()
+    rollout._environments.clear()
 
 
 def both(
@@ -138,6 +139,6 @@ def test_records_of_300_reaches_are_the_same_with_and_without_sleep() -> None:
 def test_a_sleeping_record_is_the_same_again() -> None:
     requests = random_requests(load_scenario("cylinder-clutter"), "calibration", 1, 3)
     once = [run_reach(request) for request in requests]
-    rollout._recent.clear()
+    rollout._environments.clear()
     again = [run_reach(request) for request in reversed(requests)]
     assert comparable(once) == comparable(again[::-1])

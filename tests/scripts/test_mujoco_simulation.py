@@ -5,7 +5,8 @@ import pytest
 from reaches import free_space, reach_request, small_clutter, start_angles
 from worlds import ARM, add_sensor, cylinder, make_clutter, make_world
 
-from lic_drake.reach.rollout import environment_of, simulate
+from lic_drake.reach.environment import simulate
+from lic_drake.reach.rollout import environment_of
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.trace import ReachResult
 from lic_drake.scene.scene import SceneConfig

@@ -1,0 +1,230 @@
+"""Trials of an evaluation as one file, a row for each attempt, and questions to them."""
+
+import dataclasses
+import os
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+import lic_drake
+from lic_drake.errors import LibraryError
+from lic_drake.evaluate.statistics import Count
+from lic_drake.experience.files import readable_errors, write_atomically
+
+VERSION = 1
+"""Grows with every change of the columns."""
+
+Pair = tuple[int, int]
+"""Environment and goal of a trial."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class TrialRow:
+    """One attempt of a strategy at a goal.
+
+    Attributes:
+        variant: How it was evaluated: "" where later attempts find the environment as the first
+            one left it; other words name ablations, for instance "fresh".
+        method: Strategy, see `lic_drake.select.registry.method_names`.
+        environment: Index of the environment in the evaluation's seed stream.
+        goal: Index of the goal in the environment.
+        attempt: Number of the attempt, from 1.
+        key: Key of the reach in the library of reaches.
+        success: Whether it reached the goal.
+        probability: Estimated success of the chosen start; NaN for strategies without an estimate.
+        seconds: Wall time of the selection.
+    """
+
+    variant: str
+    method: str
+    environment: int
+    goal: int
+    attempt: int
+    key: str
+    success: bool
+    probability: float
+    seconds: float
+
+
+_TYPES: dict[Any, pa.DataType] = {
+    str: pa.string(),
+    int: pa.int64(),
+    float: pa.float64(),
+    bool: pa.bool_(),
+}
+
+SCHEMA = pa.schema(
+    [
+        pa.field(item.name, _TYPES[item.type], nullable=False)
+        for item in dataclasses.fields(TrialRow)
+    ]
+)
+"""The columns of a file of trials."""
+
+_METADATA = {"lic_drake.trials_version": str(VERSION), "lic_drake.version": lic_drake.__version__}
+
+
+def write_trials(path: Path, rows: Sequence[TrialRow]) -> None:
+    """Writes the rows as a Parquet file, making its folder if it is not there.
+
+    Raises:
+        LibraryError: The system refuses; an older file is as before.
+    """
+    columns = {name: [getattr(row, name) for row in rows] for name in SCHEMA.names}
+    table = pa.Table.from_pydict(columns, schema=SCHEMA.with_metadata(_METADATA))
+    texts = [field.name for field in SCHEMA if field.type == pa.string()]
+    with readable_errors(path.parent, "create the folder"):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    write_atomically(
+        path,
+        lambda temporary: pq.write_table(
+            table, temporary, compression="zstd", use_dictionary=texts, write_page_checksum=True
+        ),
+    )
+
+
+def read_trials(path: Path) -> list[TrialRow]:
+    """Reads a file of trials; every float has the bits that it was written with.
+
+    Raises:
+        LibraryError: The file is missing, damaged, of another kind or of another version.
+    """
+    try:
+        with pq.ParquetFile(path, page_checksum_verification=True) as file:
+            _check(path, file.schema_arrow)
+            table = file.read()
+    except (OSError, UnicodeDecodeError, pa.ArrowException) as error:
+        # Damage makes pyarrow raise OSErrors, too, but without an error number.
+        number = getattr(error, "errno", None)
+        if number is not None:
+            raise LibraryError(f"cannot read {path}: {os.strerror(number)}") from None
+        raise LibraryError(
+            f"{path} is damaged or not a Parquet file; delete it and evaluate again"
+        ) from error
+    return [TrialRow(**row) for row in table.to_pylist()]
+
+
+def _check(path: Path, schema: pa.Schema) -> None:
+    """Refuses files that are no trials or that this version cannot read."""
+    version = (schema.metadata or {}).get(b"lic_drake.trials_version")
+    if version is None:
+        raise LibraryError(f"{path} holds no trials of lic_drake; choose another file")
+    if version != str(VERSION).encode() or not schema.equals(SCHEMA, check_metadata=False):
+        raise LibraryError(
+            f"{path} holds trials of version {version.decode(errors='replace')} that this"
+            f" lic_drake {lic_drake.__version__} cannot read; evaluate again"
+        )
+
+
+class TrialTable:
+    """Trials by variant and method, each a run of attempts that ends with its first success."""
+
+    def __init__(self, rows: Iterable[TrialRow]) -> None:
+        """Sorts the attempts into trials.
+
+        Raises:
+            LibraryError: A trial's attempts are not 1, 2, ... or go on after a success.
+        """
+        ordered = sorted(rows, key=lambda row: (row.environment, row.goal, row.attempt))
+        self._trials: dict[tuple[str, str], dict[Pair, tuple[TrialRow, ...]]] = {}
+        for row in ordered:
+            trials = self._trials.setdefault((row.variant, row.method), {})
+            earlier = trials.get((row.environment, row.goal), ())
+            if row.attempt != len(earlier) + 1 or any(other.success for other in earlier):
+                raise LibraryError(
+                    f"attempt {row.attempt} of {_name(row.method, row.variant)} in environment"
+                    f" {row.environment} at goal {row.goal} is there twice, lacks the attempt"
+                    " before it, or comes after a success; evaluate again"
+                )
+            trials[row.environment, row.goal] = (*earlier, row)
+
+    @property
+    def variants(self) -> tuple[str, ...]:
+        """Names of the variants, sorted; the standard evaluation, "", comes first."""
+        return tuple(sorted({variant for variant, _ in self._trials}))
+
+    def methods(self, variant: str = "") -> tuple[str, ...]:
+        """Returns the strategies that were tried in a variant, sorted."""
+        return tuple(sorted(method for v, method in self._trials if v == variant))
+
+    def pairs(self, variant: str = "") -> list[Pair]:
+        """Returns the environments and goals of a variant, sorted, the same for all its methods.
+
+        Raises:
+            LibraryError: Methods were tried on different ones.
+        """
+        tried = {method: set(self._trials[variant, method]) for method in self.methods(variant)}
+        for method, pairs in tried.items():
+            other, others = next(iter(tried.items()))
+            if pairs != others:
+                environment, goal = min(pairs ^ others)
+                raise LibraryError(
+                    f"{_name(other, variant)} and {method} were tried on different goals, for"
+                    f" instance goal {goal} of environment {environment}; evaluate all methods"
+                    " on the same ones"
+                )
+        return sorted(set().union(*tried.values()))
+
+    def trials(self, method: str, variant: str = "") -> dict[Pair, tuple[TrialRow, ...]]:
+        """Returns a method's trials by environment and goal, sorted.
+
+        Raises:
+            LibraryError: There are none.
+        """
+        if (variant, method) not in self._trials:
+            known = ", ".join(_name(m, v) for v, m in sorted(self._trials)) or "none"
+            raise LibraryError(f"no trials of {_name(method, variant)}; there are {known}")
+        return self._trials[variant, method]
+
+    def success(self, method: str, attempts: int, variant: str = "") -> NDArray[np.bool_]:
+        """Tells which trials reach the goal within their first attempts, shape (n,).
+
+        Args:
+            method: Strategy.
+            attempts: How many attempts count.
+            variant: How it was evaluated.
+
+        Returns:
+            One entry for each of `pairs(variant)`.
+
+        Raises:
+            LibraryError: There are no such trials, or some gave up before that many attempts, or
+                methods were tried on different goals.
+        """
+        trials = self.trials(method, variant)
+        for (environment, goal), rows in trials.items():
+            if len(rows) < attempts and not rows[-1].success:
+                raise LibraryError(
+                    f"{_name(method, variant)} made {len(rows)} of {attempts} attempts at goal"
+                    f" {goal} of environment {environment}; evaluate with more attempts"
+                )
+        return np.array(
+            [any(row.success for row in trials[pair][:attempts]) for pair in self.pairs(variant)]
+        )
+
+    def conditional(self, method: str, attempt: int, variant: str = "") -> Count:
+        """Counts an attempt's successes among the trials in which all before it failed.
+
+        Raises:
+            LibraryError: As `success`.
+        """
+        before = int(self.success(method, attempt - 1, variant).sum())
+        after = self.success(method, attempt, variant)
+        return Count(int(after.sum()) - before, len(after) - before)
+
+    def max_attempts(self, method: str, variant: str = "") -> int:
+        """Returns the largest number of attempts that any of a method's trials took.
+
+        Raises:
+            LibraryError: There are no trials of the method.
+        """
+        return max(map(len, self.trials(method, variant).values()))
+
+
+def _name(method: str, variant: str) -> str:
+    return f"{method} ({variant})" if variant else method

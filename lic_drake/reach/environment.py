@@ -1,0 +1,150 @@
+"""`Environment`: the diagrams of one drawn environment, and reaches simulated in them."""
+
+import math
+from contextlib import suppress
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.reach.diagram import make_reach_diagram
+from lic_drake.reach.request import is_within_reach
+from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.simulation import Simulation
+from lic_drake.reach.stop_rules import StopMonitor
+from lic_drake.reach.trace import ReachResult, ReachTrace
+from lic_drake.reach.waking import WakingSimulation
+from lic_drake.scene.sleep import MovedTooFarError, can_sleep
+
+Vector = NDArray[np.float64]
+
+
+class Environment:
+    """One environment of a scenario with its diagrams, used for many reaches.
+
+    Args:
+        scenario: Robot, contact, controller, stop rules.
+        instance: The clutter.
+        sleep: Whether objects may sleep until the arm comes near; without, a reach costs three
+            times as much and ends the same.
+        p_WR: Where the mobile base stands, shape (3,), metres; by default at the origin.
+
+    A base that reaches stands still, so the arm is always welded to the origin of the simulated
+    world and the environment is moved into the robot's frame R instead (T_b0 of paper Eq. 3).
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        instance: ClutterInstance,
+        sleep: bool = True,
+        p_WR: Vector | None = None,
+    ) -> None:
+        self.scenario = scenario
+        self.instance = instance
+        self.arm = scenario.arm()
+        self.p_WR = np.zeros(3) if p_WR is None else p_WR
+        self._in_R = instance.translated(-self.p_WR)
+        self._whole: Simulation | None = None
+        self._waking: WakingSimulation | None = None
+        if sleep and can_sleep(instance):
+            self._waking = WakingSimulation(scenario, self._in_R)
+
+    def reach(self, p_WG: Vector, x0: Vector, keep_states: bool = False) -> ReachResult:
+        """Simulates a reach.
+
+        Args:
+            p_WG: Goal, shape (3,), metres.
+            x0: Start pose of the hand.
+            keep_states: Whether the trace is to hold the whole scene.
+
+        Returns:
+            How it ended. A goal out of the arm's reach is known to fail without simulating it.
+        """
+        p_RG = p_WG - self.p_WR
+        if not is_within_reach(self.scenario, p_RG):
+            return ReachResult("unreachable", ReachTrace(), "the goal is beyond the arm's reach")
+        q0 = self.arm.solve_ik(x0 - [*self.p_WR[:2], 0.0])
+        if q0 is None:
+            return ReachResult(
+                "invalid_start", ReachTrace(), "no configuration within the joint limits"
+            )
+        result = self._simulate(q0, p_RG, keep_states)
+        result.trace.translate(self.p_WR)
+        return result
+
+    def _simulate(self, q0: Vector, p_RG: Vector, keep_states: bool) -> ReachResult:
+        if self._waking is not None:
+            # Where something moved too far at once, the reach is repeated with all objects awake.
+            with suppress(MovedTooFarError):
+                return self._simulate_in(self._waking, q0, p_RG, keep_states)
+        return self._simulate_in(self._all_awake(), q0, p_RG, keep_states)
+
+    def _simulate_in(
+        self, simulation: Simulation | WakingSimulation, q0: Vector, p_RG: Vector, keep_states: bool
+    ) -> ReachResult:
+        result = simulate(simulation, self.scenario, q0, p_RG, keep_states)
+        if result.trace.q:
+            p_WO = simulation.state().p_WO
+            result.trace.p_WO = p_WO if np.all(np.isfinite(p_WO)) else None
+        return result
+
+    def _all_awake(self) -> Simulation:
+        """Returns the simulation in which nothing sleeps, built when it is first needed."""
+        if self._whole is None:
+            diagram = make_reach_diagram(self.scenario, self._in_R)
+            self._whole = Simulation(diagram, self.scenario.scene)
+        return self._whole
+
+
+def simulate(
+    simulation: Simulation | WakingSimulation,
+    scenario: Scenario,
+    q0: Vector,
+    p_WG: Vector,
+    keep_states: bool = False,
+) -> ReachResult:
+    """Runs a simulation from rest at q0 until a stop rule ends it; the base is at the origin.
+
+    Args:
+        simulation: The environment.
+        scenario: Gives the control period and the stop rules.
+        q0: First joint angles, shape (m,), radians.
+        p_WG: Goal, shape (3,), metres.
+        keep_states: Whether the trace is to hold the whole scene.
+
+    Raises:
+        MovedTooFarError: The simulation must be repeated with every object awake.
+    """
+    arm = scenario.arm()
+    period_s = scenario.mpc.period_s
+    simulation.begin(q0, p_WG)
+    if simulation.is_in_collision():
+        return ReachResult(
+            "invalid_start", ReachTrace(), "the arm touches the clutter at its start"
+        )
+    monitor = StopMonitor(scenario.stop, p_WG, period_s)
+    trace = ReachTrace()
+    step = 0
+    while True:
+        # Drake's own arithmetic for periodic events: no rounding error decides whether a sample
+        # comes before or after the events of its instant.
+        time_s = step * period_s
+        try:
+            simulation.advance_to(time_s)
+            q = simulation.joint_angles()
+            # Reading the taxels solves the contacts of this instant, which can fail, too.
+            forces = simulation.taxel_force()
+        except (ArithmeticError, RuntimeError, ValueError) as error:
+            return ReachResult("diverged", trace, " ".join(str(error).split())[:200])
+        if not all(map(math.isfinite, q)):
+            return ReachResult("diverged", trace, "joint angles are not finite")
+        p_WE = arm.tip_position(q)
+        trace.append(time_s, q, p_WE, forces)
+        if keep_states:
+            trace.states.append(simulation.state())
+        outcome = monitor.update(time_s, p_WE, trace.peak_force[-1])
+        if outcome is not None:
+            return ReachResult(outcome, trace)
+        simulation.look_around(q)
+        step += 1

@@ -1,0 +1,240 @@
+"""Which initial conditions, hand pose x0 and base b0, are possible (paper Eqs. 3 and 4)."""
+
+from dataclasses import asdict, dataclass
+from functools import cached_property, lru_cache
+from typing import NamedTuple, Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.errors import RequestError
+from lic_drake.reach.hand_poses import HandPoses, Vector
+from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.task import BaseTrack, StartLine
+from lic_drake.robots.registry import get_robot
+from lic_drake.seeds import make_generator
+
+TOLERANCE = 1e-6
+"""A base or a hand this near to its bounds, in metres, counts as inside."""
+
+
+class InitialConditions(NamedTuple):
+    """n initial conditions.
+
+    Attributes:
+        x0: Hand poses (x, y, phi) in W, shape (n, 3), metres and radians.
+        p_WR: Positions of the base in the plane, shape (n, 2), metres.
+    """
+
+    x0: Vector
+    p_WR: Vector
+
+    @property
+    def in_R(self) -> Vector:
+        """The hand poses in the robot's frame, shape (n, 3)."""
+        return self.x0 - np.column_stack([self.p_WR, np.zeros(len(self.p_WR))])
+
+    def take(self, which: NDArray[np.generic]) -> Self:
+        """Returns some of them, by a mask or by indices."""
+        return type(self)(self.x0[which], self.p_WR[which])
+
+    def join(self, other: "InitialConditions") -> Self:
+        """Returns these followed by others."""
+        return type(self)(np.vstack([self.x0, other.x0]), np.vstack([self.p_WR, other.p_WR]))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Region:
+    """A box of initial conditions; joint limits apart, all of it is possible.
+
+    Attributes:
+        lower: Lower bounds of x0, shape (3,), in W, metres and radians.
+        upper: Upper bounds of x0, shape (3,).
+        base_lower: Lower bounds of the base, shape (2,), metres.
+        base_upper: Upper bounds of the base, shape (2,).
+    """
+
+    lower: Vector
+    upper: Vector
+    base_lower: Vector
+    base_upper: Vector
+
+    def holds(self, x0: Vector, p_WR: Vector, tolerance: float = TOLERANCE) -> bool:
+        """Tells whether an initial condition, shapes (3,) and (2,), lies in the box."""
+        return bool(
+            np.all(x0 >= self.lower - tolerance)
+            and np.all(x0 <= self.upper + tolerance)
+            and np.all(p_WR >= self.base_lower - tolerance)
+            and np.all(p_WR <= self.base_upper + tolerance)
+        )
+
+
+class Starts(Protocol):
+    """The initial conditions that a robot can choose from in an environment.
+
+    Attributes:
+        poses: The hand poses that the arm can take, in R.
+    """
+
+    @property
+    def poses(self) -> HandPoses:
+        """The hand poses that the arm can take, in R."""
+        ...
+
+    @property
+    def regions(self) -> tuple[Region, ...]:
+        """Boxes that hold all initial conditions."""
+        ...
+
+    @property
+    def grid(self) -> InitialConditions:
+        """The discrete ones, from which RND and COST choose."""
+        ...
+
+    @property
+    def lattice(self) -> InitialConditions:
+        """A denser set."""
+        ...
+
+
+def is_possible(starts: Starts, x0: Vector, p_WR: Vector) -> bool:
+    """Tells whether the robot can start so; uses the closed-form inverse kinematics.
+
+    Args:
+        starts: The possible initial conditions.
+        x0: Hand pose in W, shape (3,).
+        p_WR: Base, shape (2,), metres.
+    """
+    inside = any(region.holds(x0, p_WR) for region in starts.regions)
+    return inside and starts.poses.contains(x0 - [*p_WR, 0.0])
+
+
+@dataclass(frozen=True, kw_only=True)
+class LineStarts:
+    """A fixed base: the hand starts anywhere on the start line; satisfies `Starts`."""
+
+    poses: HandPoses
+
+    @property
+    def regions(self) -> tuple[Region, ...]:
+        """The line."""
+        line, zeros = self.poses.line, np.zeros(2)
+        return (Region(lower=line.lower, upper=line.upper, base_lower=zeros, base_upper=zeros),)
+
+    @cached_property
+    def grid(self) -> InitialConditions:
+        """The poses of the line's grid."""
+        return InitialConditions(self.poses.grid, np.zeros((len(self.poses.grid), 2)))
+
+    @cached_property
+    def lattice(self) -> InitialConditions:
+        """Poses 0.025 m and 7.5 degrees apart."""
+        return InitialConditions(self.poses.lattice, np.zeros((len(self.poses.lattice), 2)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ApertureStarts:
+    """A mobile base: the hand starts in the centre of an aperture; satisfies `Starts`.
+
+    Attributes:
+        poses: Hand poses relative to the base.
+        track: Where the base may stand.
+        p_WA: Centres of the apertures, shape (k, 3), metres.
+    """
+
+    poses: HandPoses
+    track: BaseTrack
+    p_WA: Vector
+
+    @cached_property
+    def regions(self) -> tuple[Region, ...]:
+        """One an aperture: the orientation and the base are free."""
+        line = self.poses.line
+        return tuple(
+            Region(
+                lower=np.array([x, y, line.lower[2]]),
+                upper=np.array([x, y, line.upper[2]]),
+                base_lower=np.array([x - line.x_m, max(self.track.y_min_m, y - line.y_max_m)]),
+                base_upper=np.array([x - line.x_m, min(self.track.y_max_m, y - line.y_min_m)]),
+            )
+            for x, y, _ in self.p_WA
+        )
+
+    @cached_property
+    def grid(self) -> InitialConditions:
+        """The poses of the line's grid, each at every aperture if the track allows it."""
+        return self._at_apertures(self.poses.grid)
+
+    @cached_property
+    def lattice(self) -> InitialConditions:
+        """As `grid`, 0.025 m and 7.5 degrees apart or denser."""
+        return self._at_apertures(self.poses.lattice)
+
+    def draw(self, rng: np.random.Generator, per_aperture: int) -> InitialConditions:
+        """Draws uniformly among the possible ones, the same number at each aperture.
+
+        Raises:
+            RequestError: The arm reaches an aperture from nowhere on the track.
+        """
+        found = InitialConditions(np.empty((0, 3)), np.empty((0, 2)))
+        for region in self.regions:
+            for _ in range(per_aperture):
+                found = found.join(self._draw_one(rng, region))
+        return found
+
+    def _draw_one(self, rng: np.random.Generator, region: Region) -> InitialConditions:
+        for _ in range(10_000):
+            x0 = rng.uniform(region.lower, region.upper)
+            p_WR = rng.uniform(region.base_lower, np.maximum(region.base_lower, region.base_upper))
+            if self.poses.contains(x0 - [*p_WR, 0.0]):
+                return InitialConditions(x0[None], p_WR[None])
+        raise RequestError(
+            f"the arm reaches the aperture at y = {region.lower[1]:.3f} m from nowhere on its"
+            " track; widen task.base or the orientations of task.start_line"
+        )
+
+    def _at_apertures(self, poses: Vector) -> InitialConditions:
+        found = InitialConditions(np.empty((0, 3)), np.empty((0, 2)))
+        for x, y, _ in self.p_WA:
+            p_WR = np.array([x, y]) - poses[:, :2]
+            x0 = np.column_stack([np.tile([x, y], (len(poses), 1)), poses[:, 2]])
+            low, high = self.track.y_min_m - TOLERANCE, self.track.y_max_m + TOLERANCE
+            on_track = (p_WR[:, 1] >= low) & (p_WR[:, 1] <= high)
+            # Rounding must not make one base two.
+            found = found.join(InitialConditions(x0, np.round(p_WR, 12)).take(on_track))
+        return found
+
+
+def make_starts(scenario: Scenario, instance: ClutterInstance) -> LineStarts | ApertureStarts:
+    """Returns the initial conditions that are possible in an environment of a scenario."""
+    poses, track = _poses(scenario), scenario.task.base
+    if track is None or instance.p_WA is None:
+        return LineStarts(poses=poses)
+    return ApertureStarts(poses=poses, track=track, p_WA=instance.p_WA)
+
+
+def training_starts(scenario: Scenario, stream: str, environment: int) -> InitialConditions:
+    """Returns the initial conditions that a collection tries in an environment.
+
+    They are the grid of a fixed base (paper IV-A), and random ones at each aperture for a mobile
+    base, whose grid would be far larger than the paper's 15 reaches an environment.
+    """
+    if scenario.task.base is None:
+        return LineStarts(poses=_poses(scenario)).grid
+    starts = make_starts(scenario, scenario.sample_instance(stream, environment))
+    if isinstance(starts, LineStarts):
+        return starts.grid
+    return starts.draw(
+        make_generator(stream, "starts", environment), starts.track.starts_per_aperture
+    )
+
+
+def _poses(scenario: Scenario) -> HandPoses:
+    return _hand_poses(scenario.robot, tuple(asdict(scenario.task.start_line).items()))
+
+
+@lru_cache(maxsize=16)
+def _hand_poses(robot: str, line: tuple[tuple[str, float], ...]) -> HandPoses:
+    """Returns the poses of a robot and the values of a start line; they take a second to find."""
+    return HandPoses(arm=get_robot(robot), line=StartLine(**dict(line)))

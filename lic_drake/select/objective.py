@@ -1,0 +1,73 @@
+"""F(T_b0(s), x0) of paper Eq. (3) as a function of the initial condition, for one situation."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lic_drake.estimate.estimator import SuccessEstimator
+from lic_drake.estimate.features import FeatureMap
+from lic_drake.reach.starts import InitialConditions
+from lic_drake.select.situation import FailedReach
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SuccessModel:
+    """An estimator with the meaning of its features."""
+
+    estimator: SuccessEstimator
+    features: FeatureMap
+
+
+@dataclass(frozen=True, kw_only=True)
+class Objective:
+    """The estimated probability of success at a goal, after failed reaches.
+
+    After several failures it is the smallest of the estimates that follow each of them: what one
+    failure speaks against, no other can recommend.
+
+    Attributes:
+        model: LIC-1's, or LIC-2's if there are failures to observe.
+        p_WG: Goal, shape (3,), metres.
+        failed: Failures that are observed; empty for a model without observed features.
+    """
+
+    model: SuccessModel
+    p_WG: Vector
+    failed: tuple[FailedReach, ...] = ()
+
+    def values(self, conditions: InitialConditions) -> Vector:
+        """Returns the unclipped estimates at n initial conditions, shape (n,)."""
+        features = self.model.features
+        base = np.column_stack([conditions.p_WR, np.zeros(len(conditions.p_WR))])
+        p_RG, x0 = self.p_WG - base, conditions.in_R
+        if not self.failed:
+            return self.model.estimator.values(features.join(p_RG, x0))
+        estimates = []
+        for failed in self.failed:
+            seen = np.array([features.observation(failed.shown, b) for b in conditions.p_WR])
+            estimates.append(self.model.estimator.values(features.join(p_RG, x0, seen)))
+        least: Vector = np.min(estimates, axis=0)
+        return least
+
+    def value_and_gradient(self, x0: Vector, p_WR: Vector) -> tuple[float, Vector, Vector]:
+        """Returns the estimate and its gradients by x0, shape (3,), and by the base, shape (2,).
+
+        Args:
+            x0: Hand pose in W, shape (3,).
+            p_WR: Base, shape (2,), metres.
+        """
+        features, offset = self.model.features, np.append(p_WR, 0.0)
+        observed: list[Vector | None] = [None]
+        if self.failed:
+            observed = [features.observation(failed.shown, p_WR) for failed in self.failed]
+        candidates = [
+            self.model.estimator.value_and_gradient(
+                features.join(self.p_WG - offset, x0 - offset, seen)
+            )
+            for seen in observed
+        ]
+        value, by_z = min(candidates, key=lambda candidate: candidate[0])
+        return value, features.gradient_by_x0(by_z), features.gradient_by_base(by_z)

@@ -1,0 +1,152 @@
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
+from matplotlib.container import ErrorbarContainer
+from matplotlib.figure import Figure
+
+from lic_drake.estimate.cross_validation import CalibrationBin
+from lic_drake.evaluate.figures import (
+    COLORS,
+    AttemptCounts,
+    draw_calibration,
+    draw_learning_curve,
+    draw_success_bars,
+    draw_success_by_attempts,
+    draw_success_by_goal,
+)
+from lic_drake.evaluate.learning import LearningPoint
+from lic_drake.evaluate.statistics import Count
+from lic_drake.intervals import wilson_interval
+
+OURS = {
+    "gp": AttemptCounts(first=Count(70, 100), total=Count(80, 100)),
+    "rnd": AttemptCounts(first=Count(60, 100), total=Count(75, 100)),
+}
+PAPER = {"rnd": AttemptCounts(first=Count(1220, 2000), total=Count(1483, 2000))}
+
+
+@pytest.fixture
+def ax() -> Axes:
+    return Figure(figsize=(4, 4)).subplots()
+
+
+def bars(ax: Axes) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Positions (n, 2) and ends (n, 2) of vertical error bars, by call, with the line's colour."""
+    found = []
+    for container in ax.containers:
+        if isinstance(container, ErrorbarContainer):
+            line, _, (segments,) = container.lines
+            points = line.get_xydata()
+            ends = np.array([segment[:, 1] for segment in segments.get_segments()])
+            found.append((points, ends, line.get_color()))
+    return found
+
+
+def legend(ax: Axes) -> list[str]:
+    return [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+def test_success_bars_stand_side_by_side_with_their_intervals(ax: Axes) -> None:
+    assert draw_success_bars(ax, OURS, PAPER) is ax
+    # Heights and middles: ours to the left of the tick, the paper's to the right.
+    drawn = {
+        (round(bar.get_x() + bar.get_width() / 2, 6), round(bar.get_height(), 6), bar.get_hatch())
+        for bar in ax.patches
+    }
+    assert drawn == {
+        (-0.2, 75.0, ""),
+        (-0.2, 60.0, ""),
+        (0.8, 80.0, ""),
+        (0.8, 70.0, ""),
+        (0.2, 61.0, "///"),
+        (0.2, 74.15, "///"),
+    }
+    assert [text.get_text() for text in ax.get_xticklabels()] == ["RND", "LIC(GP)"]
+    ends = {round(points[0, 1], 6): end[0] for points, end, _ in bars(ax)}
+    np.testing.assert_allclose(ends[70.0], 100 * np.array(wilson_interval(70, 100)))
+    np.testing.assert_allclose(ends[61.0], 100 * np.array(wilson_interval(1220, 2000)))
+    assert ax.get_ylim() == (0.0, 100.0)
+
+
+def test_the_first_attempt_is_drawn_over_the_total(ax: Axes) -> None:
+    draw_success_bars(ax, {"gp": OURS["gp"]}, {})
+    total, first = ax.patches
+    assert (total.get_height(), first.get_height()) == pytest.approx((80.0, 70.0))
+    assert total.get_alpha() < first.get_alpha()
+
+
+def test_the_papers_strategies_that_we_did_not_try_are_drawn_too(ax: Axes) -> None:
+    draw_success_bars(ax, {}, PAPER)
+    assert len(ax.patches) == 2
+
+
+def test_a_learning_curve_is_sorted_and_logarithmic(ax: Axes) -> None:
+    points = [
+        LearningPoint(size=n, value=v, low=v - 0.02, high=v + 0.01)
+        for n, v in ((1000, 0.6), (250, 0.5), (18900, 0.65))
+    ]
+    assert draw_learning_curve(ax, {"gp": points, "other": points[:1]}, "success") is ax
+    (line, ends, color), _ = bars(ax)
+    np.testing.assert_allclose(line, [[250, 0.5], [1000, 0.6], [18900, 0.65]])
+    np.testing.assert_allclose(ends, line[:, 1:] + [-0.02, 0.01])
+    assert color == COLORS["gp"]
+    assert ax.get_xscale() == "log"
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("reaches in the library", "success")
+    assert legend(ax) == ["LIC(GP)", "other"]
+
+
+def test_calibration_shows_observed_against_predicted_with_intervals(ax: Axes) -> None:
+    bins = [
+        CalibrationBin(low=0.1, high=0.2, count=50, predicted=0.16, observed=0.2),
+        CalibrationBin(low=0.9, high=1.0, count=10, predicted=0.95, observed=1.0),
+    ]
+    assert draw_calibration(ax, {"knn": bins}) is ax
+    ((points, ends, _),) = bars(ax)
+    np.testing.assert_allclose(points, [[0.16, 0.2], [0.95, 1.0]])
+    np.testing.assert_allclose(ends, [wilson_interval(10, 50), wilson_interval(10, 10)])
+    np.testing.assert_array_equal(ax.lines[0].get_xydata(), [[0, 0], [1, 1]])
+    assert legend(ax) == ["LIC(K-NN), n = 60"]
+    assert ax.get_aspect() == 1.0
+
+
+def test_the_goal_map_has_rates_and_counts_in_its_cells(ax: Axes) -> None:
+    goals = np.array([[0.45, -0.35], [0.48, -0.31], [0.45, 0.05], [0.65, 0.1]])
+    success = np.array([True, False, True, False])
+    assert draw_success_by_goal(ax, goals, success) is ax
+    (mesh,) = [item for item in ax.collections if isinstance(item, QuadMesh)]
+    x, y = np.moveaxis(mesh.get_coordinates(), -1, 0)
+    np.testing.assert_allclose(x[0], [0.4, 0.5, 0.6, 0.7], atol=1e-12)
+    np.testing.assert_allclose(y[:, 0], np.arange(-4, 3) / 10, atol=1e-12)
+    rates = np.ma.filled(mesh.get_array(), np.nan)
+    expected = np.full((6, 3), np.nan)
+    expected[0, 0], expected[4, 0], expected[5, 2] = 50.0, 100.0, 0.0
+    np.testing.assert_allclose(rates, expected)
+    texts = {tuple(np.round(t.get_position(), 6)): t.get_text() for t in ax.texts}
+    assert texts == {(0.45, -0.35): "1/2", (0.45, 0.05): "1/1", (0.65, 0.15): "0/1"}
+    assert (mesh.norm.vmin, mesh.norm.vmax) == (0.0, 100.0)
+    assert ax.get_aspect() == 1.0
+
+
+def test_goals_on_an_edge_of_a_cell_belong_to_the_cell_above(ax: Axes) -> None:
+    # Multiples of 0.1 in floating point lie on either side of the edges.
+    goals = np.array([[0.1 * i, 0.3] for i in range(1, 8)])
+    draw_success_by_goal(ax, goals, np.ones(7, dtype=bool))
+    assert sorted(round(t.get_position()[0], 6) for t in ax.texts) == pytest.approx(
+        [0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75]
+    )
+    assert {t.get_text() for t in ax.texts} == {"1/1"}
+
+
+def test_success_grows_with_the_attempts(ax: Axes) -> None:
+    counts = {
+        "knn": [Count(70, 100), Count(80, 100), Count(85, 100)],
+        "rnd": [Count(60, 100), Count(72, 100)],
+    }
+    assert draw_success_by_attempts(ax, counts) is ax
+    rnd, knn = bars(ax)
+    np.testing.assert_allclose(rnd[0], [[1, 60], [2, 72]])
+    np.testing.assert_allclose(knn[0], [[1, 70], [2, 80], [3, 85]])
+    np.testing.assert_allclose(knn[1][2], 100 * np.array(wilson_interval(85, 100)))
+    assert legend(ax) == ["RND, n = 100", "LIC(K-NN), n = 100"]
+    np.testing.assert_array_equal(ax.get_xticks(), [1, 2, 3])

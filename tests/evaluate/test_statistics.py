@@ -1,0 +1,100 @@
+from itertools import product
+from math import comb, inf, isnan
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import norm, ttest_ind
+
+from lic_drake.evaluate.statistics import (
+    Count,
+    count,
+    mcnemar,
+    paired_difference,
+    two_sample_t_test,
+)
+from lic_drake.intervals import wilson_interval
+
+outcomes = st.lists(st.tuples(st.booleans(), st.booleans()), min_size=1, max_size=12)
+
+
+def test_a_count_knows_its_rate_and_interval() -> None:
+    assert count(np.array([[True, False], [True, True]])) == (3, 4)
+    assert Count(3, 4).rate == 0.75
+    assert Count(3, 4).interval() == wilson_interval(3, 4)
+    assert Count(3, 4).interval(0.5) == wilson_interval(3, 4, 0.5)
+    assert isnan(Count(0, 0).rate)
+
+
+def test_mcnemar_is_the_sign_test_of_the_goals_that_only_one_strategy_reached() -> None:
+    a = np.array([True] * 9 + [False] * 2 + [True] * 20 + [False] * 5)
+    b = np.array([False] * 9 + [True] * 2 + [True] * 20 + [False] * 5)
+    exact = 2 * sum(comb(11, k) for k in range(3)) / 2**11
+    assert mcnemar(a, b) == pytest.approx(exact)
+    assert mcnemar(b, a) == pytest.approx(exact)
+    assert mcnemar(a, a) == 1.0
+
+
+@given(outcomes)
+def test_mcnemar_is_the_share_of_exchanges_that_differ_as_much(
+    pairs: list[tuple[bool, bool]],
+) -> None:
+    # If the strategies are alike, each pair may as well have been the other way round.
+    a, b = np.array(pairs).T
+    differences = (a.astype(int) - b)[a != b]
+    sums = [np.dot(signs, differences) for signs in product((-1, 1), repeat=len(differences))]
+    assert mcnemar(a, b) == pytest.approx(np.mean(np.abs(sums) >= abs(differences.sum())))
+
+
+@given(outcomes, st.floats(0.5, 0.99))
+def test_a_paired_difference_is_that_of_the_rates_with_two_trials_added(
+    pairs: list[tuple[bool, bool]], confidence: float
+) -> None:
+    a, b = np.array(pairs).T
+    result = paired_difference(a, b, confidence)
+    assert result.value == pytest.approx(a.mean() - b.mean())
+    # Half a trial of each kind, as weights of differences +1, -1, 0 and 0.
+    values = np.concatenate([a.astype(float) - b, [1.0, -1.0, 0.0, 0.0]])
+    weights = np.concatenate([np.ones(len(a)), np.full(4, 0.5)])
+    mean = np.average(values, weights=weights)
+    deviation = np.sqrt(np.average((values - mean) ** 2, weights=weights) / weights.sum())
+    low, high = norm.interval(confidence, mean, deviation)
+    np.testing.assert_allclose(result[1:], (max(low, -1.0), min(high, 1.0)), atol=1e-12)
+
+
+@pytest.mark.parametrize("probabilities", [(0.6, 0.1, 0.2, 0.1), (0.9, 0.0, 0.05, 0.05)])
+def test_intervals_of_differences_cover_nine_times_in_ten(
+    probabilities: tuple[float, ...],
+) -> None:
+    rng = np.random.default_rng(1)
+    truth = probabilities[2] - probabilities[1]
+    covered = []
+    for draw in rng.choice(4, p=probabilities, size=(2000, 100)):
+        # Outcomes 0 to 3: both succeed, only b, only a, neither.
+        _, low, high = paired_difference((draw == 0) | (draw == 2), draw <= 1)
+        covered.append(low <= truth <= high)
+    assert np.mean(covered) == pytest.approx(0.9, abs=0.04)
+
+
+@pytest.mark.filterwarnings("ignore:Precision loss:RuntimeWarning")
+@given(st.integers(2, 60), st.integers(2, 60), st.data())
+def test_the_t_test_is_scipys_with_pooled_variance(n: int, m: int, data: st.DataObject) -> None:
+    a = Count(data.draw(st.integers(1, n - 1)), n)
+    b = Count(data.draw(st.integers(0, m)), m)
+    zeros_and_ones = [np.arange(c.trials) < c.successes for c in (a, b)]
+    expected = ttest_ind(*(x.astype(float) for x in zeros_and_ones), equal_var=True)
+    result = two_sample_t_test(a, b)
+    assert result.df == expected.df == n + m - 2
+    assert result.t == pytest.approx(expected.statistic, abs=1e-9)
+    assert result.p == pytest.approx(expected.pvalue, abs=1e-12)
+
+
+def test_a_t_test_of_sure_outcomes_is_sure() -> None:
+    assert two_sample_t_test(Count(5, 5), Count(7, 7)) == (10, 0.0, 1.0)
+    assert two_sample_t_test(Count(0, 5), Count(7, 7)) == (10, -inf, 0.0)
+
+
+def test_a_t_test_needs_two_trials_of_each() -> None:
+    with pytest.raises(ValueError, match="2 trials of each strategy, got 1, 9"):
+        two_sample_t_test(Count(1, 1), Count(3, 9))
