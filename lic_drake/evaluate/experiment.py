@@ -12,6 +12,7 @@ import numpy as np
 from lic_drake.errors import LicError
 from lic_drake.evaluate.trial import Attempt, planar_arm_of, run_trial
 from lic_drake.evaluate.trials import TrialRow, read_trials, write_trials
+from lic_drake.experience.real_pairs import pair_real_attempts
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.experience.workers import prepare_worker
 from lic_drake.reach.request import ReachRecord, ReachRequest
@@ -36,8 +37,7 @@ class Evaluation:
     """What is to be tried; plain data that pickles.
 
     Attributes:
-        experience: Library or libraries that the strategies learn from; the first one says the
-            scenario. Rows of attempts that came after another one serve LIC-2 only.
+        experience: Library that the strategies learn from; it says the scenario.
         results: Folder for `trials.parquet` and the library `reaches` of the evaluation's reaches.
         methods: Strategies, see `lic_drake.select.registry.check_method`.
         environments: Number of environments, from index `first_environment`.
@@ -48,6 +48,8 @@ class Evaluation:
         fresh: Whether later attempts find the environment as it was drawn.
         variant: Name for these trials among others in the same folder.
         common_goals: Whether all environments have the goals of the first one.
+        second_attempts: Library of real second attempts that LIC-2 learns from; None: D2 is made
+            from single reaches, as in the paper.
     """
 
     experience: Path
@@ -61,6 +63,7 @@ class Evaluation:
     fresh: bool = False
     variant: str = ""
     common_goals: bool = False
+    second_attempts: Path | None = None
 
     @property
     def trials_path(self) -> Path:
@@ -162,6 +165,10 @@ class _Worker:
         experience = ExperienceLibrary(evaluation.experience)
         self.scenario = experience.scenario()
         self._columns = experience.columns()
+        self._pairs = None
+        if evaluation.second_attempts is not None:
+            attempts = ExperienceLibrary(evaluation.second_attempts)
+            self._pairs = pair_real_attempts(attempts.columns())
         self._selectors: dict[str, Selector] = {}
         library = evaluation.reaches
         self._known = {r.key: r for r in library.records()} if library.shard_paths() else {}
@@ -205,6 +212,7 @@ class _Worker:
                 planar_arm_of(self.scenario),
                 self._columns if needs_library(method) else None,
                 category=self.scenario.category,
+                pairs=self._pairs,
             )
         return self._selectors[method]
 

@@ -201,7 +201,11 @@ def _add_base(plant: MultibodyPlant, base: ModelInstanceIndex) -> Frame:
         plant.AddJoint(PrismaticJoint(f"base_{axis}", frame, body.body_frame(), direction))
         frame = body.body_frame()
     plant.RegisterVisualGeometry(
-        body, RigidTransform(np.array([-0.1, 0.0, 0.0])), Box(0.2, 0.2, 0.02), "base_visual", BASE_COLOR
+        body,
+        RigidTransform(np.array([-0.1, 0.0, 0.0])),
+        Box(0.2, 0.2, 0.02),
+        "base_visual",
+        BASE_COLOR,
     )
     return frame
 

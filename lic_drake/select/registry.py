@@ -90,6 +90,7 @@ def make_selector(
     columns: Mapping[str, NDArray[Any]] | None = None,
     rng: np.random.Generator | None = None,
     category: str = "cylinder-clutter",
+    pairs: Mapping[str, NDArray[Any]] | None = None,
 ) -> Selector:
     """Returns a strategy, fitted to a library if it learns from one.
 
@@ -99,6 +100,8 @@ def make_selector(
         columns: Columns of the experience library; not needed by the baselines.
         rng: Source of draws for RND; by default always the same ones.
         category: Clutter category, which says what LIC observes.
+        pairs: Columns of D2 for LIC-2, see `lic_drake.experience.real_pairs`; by default it is
+            made from the single reaches of `columns`, as in the paper.
 
     Raises:
         RequestError: The strategy is unknown, or has no library to learn from.
@@ -107,8 +110,8 @@ def make_selector(
     first, later = split_method(method)
     if later is not None:
         return FallbackSelector(
-            first=make_selector(first, arm, columns, rng, category),
-            later=make_selector(later, arm, columns, rng, category),
+            first=make_selector(first, arm, columns, rng, category, pairs),
+            later=make_selector(later, arm, columns, rng, category, pairs),
             method=method,
         )
     if not needs_library(method):
@@ -118,12 +121,11 @@ def make_selector(
         raise RequestError(f"method {method!r} needs an experience library to learn from")
     features, only_first = features_of(category), method not in estimator_names()
     estimator = method[:-1] if only_first else method
-    return LicSelector(
-        arm,
-        fit_model(estimator, features.first, columns),
-        None if only_first else fit_model(estimator, features.second, pair_reaches(columns)),
-        method=method,
-    )
+    second = None
+    if not only_first:
+        pairs = pair_reaches(columns) if pairs is None else pairs
+        second = fit_model(estimator, features.second, pairs)
+    return LicSelector(arm, fit_model(estimator, features.first, columns), second, method=method)
 
 
 def fit_model(
