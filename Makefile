@@ -5,7 +5,7 @@ VENV := .venv
 PYTHON_IN_VENV := $(VENV)/bin/python
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo test lint clean
+.PHONY: setup demo test lint tables evaluation clean
 .DELETE_ON_ERROR:
 
 setup: $(STAMP)
@@ -20,6 +20,19 @@ lint: $(STAMP)
 	$(PYTHON_IN_VENV) -m ruff check .
 	$(PYTHON_IN_VENV) -m ruff format --check .
 	$(PYTHON_IN_VENV) -m mypy
+
+# Tables I to IV, bounds and figures from the committed records, in seconds.
+tables: $(STAMP)
+	for table in 1_cylinder 2_t_tests 3_passage 4_aperture; do \
+	  $(PYTHON_IN_VENV) scripts/table_$$table.py || exit 1; done
+	$(PYTHON_IN_VENV) scripts/tabulate_bounds.py
+	$(PYTHON_IN_VENV) scripts/tabulate_second_attempts.py
+	$(PYTHON_IN_VENV) scripts/make_figures.py
+
+# The records themselves, from nothing in some hours; interrupted, it goes on where it was. What is
+# there is not simulated again: delete notebooks/results and models/experience for a new start.
+evaluation: $(STAMP)
+	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" scripts/run_evaluation.sh
 
 # The stamp is written last, so an interrupted installation is taken up again. Drake's wheel needs
 # one system library that pip cannot bring.

@@ -70,6 +70,9 @@ def make_record(request: ReachRequest) -> ReachRecord:
         detail="" if began else 'the arm touches "success": true\r\n at its start',
         lic_drake_version="0.1.0",
         drake_version="1.58.0",
+        base_x=request.base[0],
+        base_y=request.base[1],
+        after=tuple(x for earlier in request.after for x in (*earlier.start, *earlier.base)),
     )
 
 

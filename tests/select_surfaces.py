@@ -4,12 +4,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lic_drake.estimate.estimator import Prediction
+from lic_drake.estimate.features import PLANAR_LIC1, FeatureMap
+from lic_drake.select.objective import SuccessModel
 
 Vector = NDArray[np.float64]
 
 
 class Bumps:
-    """A sum of Gaussian bumps over z = (goal_x, goal_y, y, phi), the first ones over (y, phi)."""
+    """A sum of Gaussian bumps over the last features of z, in PLANAR_LIC1 over (y, phi)."""
 
     def __init__(self, centres: Vector, heights: Vector, width: Vector) -> None:
         self.centres, self.heights, self.width = centres, heights, width
@@ -17,15 +19,19 @@ class Bumps:
     def fit(self, Z: Vector, f: Vector, environment: Vector | None = None) -> "Bumps":
         return self
 
+    def values(self, Z: Vector) -> Vector:
+        d = (Z[:, None, -len(self.width) :] - self.centres) / self.width
+        values: Vector = np.exp(-0.5 * np.sum(d**2, axis=2)) @ self.heights
+        return values
+
     def predict(self, Z: Vector) -> Prediction:
-        values = np.array([self.value_and_gradient(z)[0] for z in Z])
-        return Prediction(probability=np.clip(values, 0.0, 1.0), spread=np.zeros(len(Z)))
+        return Prediction(probability=np.clip(self.values(Z), 0.0, 1.0), spread=np.zeros(len(Z)))
 
     def value_and_gradient(self, z: Vector) -> tuple[float, Vector]:
-        d = (z[2:] - self.centres) / self.width
+        d = (z[-len(self.width) :] - self.centres) / self.width
         terms = self.heights * np.exp(-0.5 * np.sum(d**2, axis=1))
         gradient = np.zeros(len(z))
-        gradient[2:] = -(terms[:, None] * d / self.width).sum(axis=0)
+        gradient[-len(self.width) :] = -(terms[:, None] * d / self.width).sum(axis=0)
         return float(terms.sum()), gradient
 
 
@@ -36,3 +42,21 @@ def random_bumps(seed: int, count: int = 4) -> Bumps:
         rng.uniform(0.3, 0.9, size=count),
         np.array([0.15, 0.5]),
     )
+
+
+# By the last part of a feature's name: from where to where it goes, and how wide a bump is.
+_RANGES = {
+    "x": (0.4, 0.8, 0.3),
+    "y": (-0.4, 0.4, 0.25),
+    "phi": (-0.7, 1.6, 0.6),
+    "vx": (-0.2, 0.2, 0.2),
+    "vy": (-0.2, 0.2, 0.2),
+}
+
+
+def random_model(seed: int, features: FeatureMap = PLANAR_LIC1, count: int = 5) -> SuccessModel:
+    """A model whose estimate depends on every one of its features."""
+    rng = np.random.default_rng(seed)
+    low, high, width = np.array([_RANGES[name.split("_")[-1]] for name in features.names]).T
+    bumps = Bumps(rng.uniform(low, high, (count, len(low))), rng.uniform(0.4, 0.9, count), width)
+    return SuccessModel(estimator=bumps, features=features)

@@ -22,6 +22,7 @@ from worlds import box, cylinder, make_clutter
 
 from lic_drake.control.mpc import HapticMpc
 from lic_drake.evaluate.batch import random_requests
+from lic_drake.reach import environment as reach_environment
 from lic_drake.reach import recording, rollout, waking
 from lic_drake.reach.diagram import ReachDiagram, make_reach_diagram
 from lic_drake.reach.recording import ReachRecording
@@ -39,14 +40,14 @@ def built(monkeypatch: pytest.MonkeyPatch) -> Iterator[list["weakref.ref[Any]"]]
     """Weak references to all diagrams, and their systems, that are built during a test."""
     references: list[weakref.ref[Any]] = []
 
-    def make(*args: Any) -> ReachDiagram:
-        reach_diagram = make_reach_diagram(*args)
+    def make(*args: Any, **options: Any) -> ReachDiagram:
+        reach_diagram = make_reach_diagram(*args, **options)
         systems = reach_diagram.diagram.GetSystems()
         references.extend(weakref.ref(item) for item in (reach_diagram.diagram, *systems))
         return reach_diagram
 
     rollout._environments.clear()
-    for module in (rollout, recording, waking):
+    for module in (reach_environment, recording, waking):
         monkeypatch.setattr(module, "make_reach_diagram", make)
     yield references
     rollout._environments.clear()
@@ -101,9 +102,14 @@ def test_failures_and_invalid_starts_leave_nothing(
 
 def test_a_recording_dies(built: list["weakref.ref[Any]"], tmp_path: Path) -> None:
     scenario = free_space(0.2)
-    recorded = ReachRecording(scenario, make_clutter(cylinder(0.5, 0.3, movable=True)))
-    recorded.add_reach(np.array(reach_request(scenario).start), np.array([0.6, 0.1, 0.0]))
+    clutter = make_clutter(cylinder(0.5, 0.3, movable=True))
+    x0, p_WG = np.array(reach_request(scenario).start), np.array([0.6, 0.1, 0.0])
+    environment = Environment(scenario, clutter)
+    result = environment.reach(p_WG, x0, keep_states=True)
+    recorded = ReachRecording(scenario, clutter)
+    recorded.add_reach(result.trace, p_WG)
     recorded.save(tmp_path / "reach.html")
+    del environment
     assert alive(built)
     del recorded
     assert alive(built) == []

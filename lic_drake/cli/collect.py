@@ -102,7 +102,7 @@ def run(args: argparse.Namespace) -> int:
     request = _make_request(args)
     shard = Shard.parse(args.shard)
     environments = len(shard.share(request.environment_indices))
-    goals, starts = len(request.goals()), len(request.starts())
+    goals, starts = len(request.goals()), len(request.starts().x0)
     print(
         f"{request.scenario.category}: {environments} environments x {goals} goals x"
         f" {starts} starts = {environments * goals * starts} reaches into {args.library}",

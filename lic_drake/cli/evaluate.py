@@ -44,6 +44,25 @@ def add_parser(subparsers: Subparsers) -> None:
             help=f"{text} (default: %(default)s)",
         )
     parser.add_argument(
+        "--stream",
+        default="evaluation",
+        metavar="NAME",
+        help="seed stream of environments and goals: training, evaluation, calibration or holdout"
+        " (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--common-goals",
+        action="store_true",
+        help="the same goals in all environments (default: others in each)",
+    )
+    parser.add_argument(
+        "--second-attempts",
+        type=Path,
+        metavar="FOLDER",
+        help="library of real second attempts that LIC-2 learns from (default: pairs of single"
+        " reaches, as in the paper)",
+    )
+    parser.add_argument(
         "--fresh",
         action="store_true",
         help="let later attempts find the environment as it was drawn (default: as the attempt"
@@ -73,6 +92,9 @@ def run(args: argparse.Namespace) -> int:
         environments=args.environments,
         goals=args.goals,
         attempts=args.attempts,
+        stream=args.stream,
+        common_goals=args.common_goals,
+        second_attempts=args.second_attempts,
         fresh=args.fresh,
         variant=args.variant,
     )

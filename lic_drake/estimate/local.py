@@ -15,7 +15,9 @@ from lic_drake.estimate.checks import (
 from lic_drake.estimate.estimator import Prediction, SuccessEstimator
 from lic_drake.seeds import make_generator
 
-_CACHE_SIZE = 32
+_CACHE_SIZE = 64
+# In length scales: queries in one cell share a local model, which is that of the cell's centre.
+_CELL = 0.5
 
 
 class LocalModel(SuccessEstimator, Protocol):
@@ -34,10 +36,12 @@ class LocalModel(SuccessEstimator, Protocol):
 class LocalEstimator:
     """Fits a model on the rows whose situation is nearest; satisfies `SuccessEstimator`.
 
-    The model chooses its settings once, on a random part of the rows. Rows are near in the
-    situation, not in the decision: one local model then serves a whole optimisation over starts,
-    and value and gradient belong to one smooth function. Rows at equal distance are taken in
-    random order, lest the order of the library choose environments. The spread is the model's.
+    The model chooses its settings once, on a random part of the rows, and with them the length
+    scales by which rows are near. They are near in the situation, not in the decision: one local
+    model then serves a whole optimisation over starts, and value and gradient belong to one smooth
+    function. Where a moving base moves the situation, too, a model serves half a length scale and
+    the estimate has a small jump where the next one takes over. Rows at equal distance are taken
+    in random order, lest the order of the library choose environments. The spread is the model's.
 
     Attributes:
         size: Number of rows in a local model.
@@ -90,8 +94,8 @@ class LocalEstimator:
         """Estimates P(success) for queries Z, shape (n, d); see `Predictor`."""
         Z = checked_queries(Z, self._fitted().shape[1])
         probability, spread = np.empty(len(Z)), np.empty(len(Z))
-        for situation, members in self._situations(Z):
-            prediction = self._local_model(situation).predict(Z[members])
+        for cell, members in self._cells_of(Z):
+            prediction = self._local_model(cell).predict(Z[members])
             probability[members], spread[members] = prediction.probability, prediction.spread
         return Prediction(probability=probability, spread=spread)
 
@@ -99,8 +103,8 @@ class LocalEstimator:
         """Returns the local models' estimates for queries Z, shape (n, d): shape (n,)."""
         Z = checked_queries(Z, self._fitted().shape[1])
         values = np.empty(len(Z))
-        for situation, members in self._situations(Z):
-            values[members] = self._local_model(situation).values(Z[members])
+        for cell, members in self._cells_of(Z):
+            values[members] = self._local_model(cell).values(Z[members])
         return values
 
     def value_and_gradient(self, z: ArrayLike) -> tuple[float, Vector]:
@@ -110,23 +114,29 @@ class LocalEstimator:
         situations have other rows.
         """
         query = checked_queries(np.atleast_2d(z), self._fitted().shape[1])[0]
-        return self._local_model(query[self._situation]).value_and_gradient(query)
+        return self._local_model(self._cell(query)).value_and_gradient(query)
 
-    def _situations(self, Z: Vector) -> Iterator[tuple[Vector, NDArray[np.intp]]]:
-        """Yields each distinct situation with the queries in it."""
-        situations, group = np.unique(Z[:, self._situation], axis=0, return_inverse=True)
+    def _cell(self, Z: Vector) -> Vector:
+        """Returns the centres of the queries' cells, shape (..., k), in length scales."""
+        in_scales = Z[..., self._situation] / self._model.length_scale[self._situation]
+        centres: Vector = _CELL * np.round(in_scales / _CELL) + 0.0
+        return centres
+
+    def _cells_of(self, Z: Vector) -> Iterator[tuple[Vector, NDArray[np.intp]]]:
+        """Yields each cell that holds any queries, with their indices."""
+        cells, group = np.unique(self._cell(Z), axis=0, return_inverse=True)
         order = np.argsort(group.ravel(), kind="stable")
         members = np.split(order, np.cumsum(np.bincount(group.ravel()))[:-1])
-        yield from zip(situations, members, strict=True)
+        yield from zip(cells, members, strict=True)
 
-    def _local_model(self, situation: Vector) -> SuccessEstimator:
+    def _local_model(self, cell: Vector) -> SuccessEstimator:
         rows = self._fitted()
         if len(rows) <= self.size:
             return self._model
-        key = situation.tobytes()
+        key = cell.tobytes()
         if key not in self._cache:
-            offsets = self._scaled - situation / self._model.length_scale[self._situation]
-            nearest = np.argsort(np.sum(offsets**2, axis=1), kind="stable")[: self.size]
+            distance = np.sum((self._scaled - cell) ** 2, axis=1)
+            nearest = np.argpartition(distance, self.size)[: self.size]
             if len(self._cache) >= _CACHE_SIZE:
                 del self._cache[next(iter(self._cache))]
             self._cache[key] = self._model.conditioned_on(rows[nearest], self._f[nearest])

@@ -51,7 +51,9 @@ def _process(features: FeatureMap) -> SuccessEstimator:
 def _neighbours(features: FeatureMap) -> SuccessEstimator:
     if not features.observed:
         return NearestNeighbours()
-    return LocalEstimator(NearestNeighbours(), features.situation)
+    return LocalEstimator(
+        NearestNeighbours(neighbours=400), features.situation, size=2000, settings_size=20_000
+    )
 
 
 register_estimator("gp", _process)

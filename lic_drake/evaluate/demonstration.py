@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from lic_drake.errors import LicError
-from lic_drake.evaluate.density import density_lattice, estimate_density
-from lic_drake.evaluate.plots import draw_density, draw_top_view, save_figure
+from lic_drake.evaluate.attempt_figures import densities_figure
+from lic_drake.evaluate.plots import draw_top_view, save_figure
 from lic_drake.evaluate.trial import Attempt, planar_arm_of, run_trial
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.recording import ReachRecording
@@ -24,7 +24,7 @@ from lic_drake.reach.starts import Starts, make_starts
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.registry import Selector, make_selector, needs_library
-from lic_drake.select.situation import FailedReach, Selection, Situation
+from lic_drake.select.situation import Selection, Situation
 
 Vector = NDArray[np.float64]
 
@@ -112,7 +112,7 @@ def demonstrate(
     if not isinstance(chosen, LicSelector):  # Shows what LIC would have thought of the choices.
         chosen = make_selector("gp", arm, columns, category=scenario.category)
     assert isinstance(chosen, LicSelector)
-    _save_density(files["density"], chosen, starts, p_WG, done)
+    save_figure(densities_figure(chosen, starts, p_WG, done), files["density"])
     figure = Figure(figsize=(7, 7))
     draw_top_view(
         figure.subplots(),
@@ -173,26 +173,6 @@ def _make_folder(out: Path) -> None:
         raise LicError(
             f"cannot write into {out}: {error.strerror}; choose another folder with --out"
         ) from None
-
-
-def _save_density(
-    path: Path, selector: LicSelector, starts: Starts, p_WG: Vector, attempts: list[Attempt]
-) -> None:
-    """Draws what LIC-1, and LIC-2 if there was a second attempt, made of the starts (Fig. 6)."""
-    figure = Figure(figsize=(7.0 * len(attempts), 4.5))
-    axes = figure.subplots(1, len(attempts), squeeze=False)[0]
-    conditions, shape = density_lattice(starts)
-    for number, (ax, attempt) in enumerate(zip(axes, attempts, strict=True), start=1):
-        failed = tuple(FailedReach.from_record(a.record) for a in attempts[: number - 1])
-        situation = Situation(p_WG=p_WG, starts=starts, failed=failed)
-        probability = estimate_density(selector, situation, conditions)
-        x0 = attempt.selection.x0 - [*attempt.selection.p_WR, 0.0]
-        draw_density(ax, conditions.in_R, probability, shape, [(f"attempt {number}", x0)])
-        model = 1 if selector.second is None else min(number, 2)
-        ax.set_title(
-            f"LIC-{model} ({selector.method}), goal ({p_WG[0]:.2f}, {p_WG[1]:.2f}) m", fontsize=10
-        )
-    save_figure(figure, path)
 
 
 def _write_json(result: Demonstration, method: str, seed: int) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from lic_drake.reach.starts import InitialConditions, Starts
+from lic_drake.reach.starts import InitialConditions, Region, Starts
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.situation import Situation
 
@@ -13,7 +13,7 @@ DENSITY_SHAPE = (81, 91)
 """Lattice of a density: y every 1 cm, phi every 2 degrees."""
 
 
-def density_lattice(starts: Starts, aperture: int = 0) -> tuple[InitialConditions, tuple[int, int]]:
+def density_lattice(starts: Starts, region: Region) -> tuple[InitialConditions, tuple[int, int]]:
     """Returns initial conditions over a whole start line, possible or not, and their shape.
 
     Where the base moves, the hand is in the centre of an aperture and the base varies; relative to
@@ -21,12 +21,12 @@ def density_lattice(starts: Starts, aperture: int = 0) -> tuple[InitialCondition
 
     Args:
         starts: The possible ones.
-        aperture: Which aperture, where there are any.
+        region: One of their regions: the line, or an aperture.
 
     Returns:
         n initial conditions of which phi varies fastest, and the numbers of y and phi values.
     """
-    line, region = starts.poses.line, starts.regions[aperture]
+    line = starts.poses.line
     y = np.linspace(line.lower[1], line.upper[1], DENSITY_SHAPE[0])
     phi = np.linspace(line.lower[2], line.upper[2], DENSITY_SHAPE[1])
     poses = np.array([[line.x_m, yi, phi_i] for yi in y for phi_i in phi])

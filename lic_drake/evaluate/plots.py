@@ -80,6 +80,49 @@ def draw_top_view(
         attempts: Labels and traces of the reaches.
     """
     arm = scenario.arm()
+    _draw_objects(ax, instance)
+    _draw_starts(ax, scenario)
+    for i, (label, trace) in enumerate(attempts):
+        color_name = ATTEMPT_COLORS[i % len(ATTEMPT_COLORS)]
+        if not trace.q:
+            continue
+        if isinstance(arm, PlanarArm):
+            for q, alpha in ((trace.q[0], 0.25), (trace.q[-1], 0.8)):
+                _draw_arm(ax, arm, q, trace.p_WR, color_name, alpha)
+        path = np.array(trace.p_WE)
+        ax.plot(path[:, 0], path[:, 1], color=color_name, lw=1.5, label=label)
+    _draw_goal(ax, scenario, p_WG)
+    if ax.get_legend_handles_labels()[0]:  # No attempt of which there is a path, no legend.
+        ax.legend(loc="upper left", fontsize=8)
+    return ax
+
+
+def draw_snapshot(
+    ax: Axes, scenario: Scenario, instance: ClutterInstance, p_WG: Vector, trace: ReachTrace, k: int
+) -> Axes:
+    """Draws a sample of a reach from above, with the tip's path up to it (paper Fig. 5).
+
+    Args:
+        ax: Where to draw.
+        scenario: Gives the arm, the start line and the goal's size.
+        instance: The clutter as it was drawn.
+        p_WG: Goal, shape (3,), metres.
+        trace: Samples with their states.
+        k: Index of the sample.
+    """
+    arm = scenario.arm()
+    _draw_objects(ax, instance.with_objects_at(trace.states[k].p_WO))
+    _draw_starts(ax, scenario)
+    if isinstance(arm, PlanarArm):
+        _draw_arm(ax, arm, trace.q[k], trace.p_WR, "0.35", 0.8)
+    path = np.array(trace.p_WE[: k + 1])
+    ax.plot(path[:, 0], path[:, 1], color="tab:blue", lw=1.0)
+    _draw_goal(ax, scenario, p_WG)
+    ax.set_title(f"{trace.time_s[k]:.1f} s", fontsize=9)
+    return ax
+
+
+def _draw_objects(ax: Axes, instance: ClutterInstance) -> None:
     for i in range(instance.num_objects):
         color = tuple(MOVABLE_COLOR if instance.movable[i] else FIXED_COLOR)
         position = (instance.p_WO[i, 0], instance.p_WO[i, 1])
@@ -97,27 +140,22 @@ def draw_top_view(
             )
         else:
             ax.add_patch(Circle(position, instance.size[i, 0], color=color))
+
+
+def _draw_starts(ax: Axes, scenario: Scenario) -> None:
+    """Draws where the hand may start, green, or, with a mobile base, where that may, blue."""
     line, track = scenario.task.start_line, scenario.task.base
     if track is None:
         ax.plot([line.x_m] * 2, [line.y_min_m, line.y_max_m], color="tab:green", lw=1, ls="--")
     else:
         ax.plot([0.0, 0.0], [track.y_min_m, track.y_max_m], color="tab:blue", lw=1, ls="--")
-    for i, (label, trace) in enumerate(attempts):
-        color_name = ATTEMPT_COLORS[i % len(ATTEMPT_COLORS)]
-        if not trace.q:
-            continue
-        if isinstance(arm, PlanarArm):
-            for q, alpha in ((trace.q[0], 0.25), (trace.q[-1], 0.8)):
-                _draw_arm(ax, arm, q, trace.p_WR, color_name, alpha)
-        path = np.array(trace.p_WE)
-        ax.plot(path[:, 0], path[:, 1], color=color_name, lw=1.5, label=label)
+
+
+def _draw_goal(ax: Axes, scenario: Scenario, p_WG: Vector) -> None:
     ax.add_patch(
         Circle((p_WG[0], p_WG[1]), scenario.stop.success_distance_m, color="tab:cyan", zorder=5)
     )
     ax.set(xlabel="x [m]", ylabel="y [m]", aspect="equal", xlim=(-0.3, 1.05), ylim=(-0.75, 0.75))
-    if ax.get_legend_handles_labels()[0]:  # No attempt of which there is a path, no legend.
-        ax.legend(loc="upper left", fontsize=8)
-    return ax
 
 
 def _draw_arm(ax: Axes, arm: PlanarArm, q: Vector, p_WR: Vector, color: str, alpha: float) -> None:

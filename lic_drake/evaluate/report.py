@@ -76,13 +76,26 @@ def write_tables(results: Path, number: int) -> list[Path]:
     Raises:
         LibraryError: As `make_tables`, or the files cannot be written.
     """
-    tables = make_tables(results, number)
+    return write_table_files(results, f"table_{number}", make_tables(results, number))
+
+
+def write_table_files(results: Path, name: str, tables: Sequence[Table]) -> list[Path]:
+    """Writes tables as one Markdown and one LaTeX file and returns the files.
+
+    Args:
+        results: Folder of all records; the files go into its folder `tables`.
+        name: Of the files, without suffix.
+        tables: What to write, in this order.
+
+    Raises:
+        LibraryError: The files cannot be written.
+    """
     folder = results / "tables"
     with readable_errors(folder, "create the folder"):
         folder.mkdir(parents=True, exist_ok=True)
     texts = {
-        folder / f"table_{number}.md": "\n".join(table.to_markdown() for table in tables),
-        folder / f"table_{number}.tex": "\n".join(table.to_latex() for table in tables),
+        folder / f"{name}.md": "\n".join(table.to_markdown() for table in tables),
+        folder / f"{name}.tex": "\n".join(table.to_latex() for table in tables),
     }
     for path, text in texts.items():
         _write(path, text)

@@ -41,13 +41,19 @@ class HandPoses:
         poses = [np.array([self.line.x_m, yi, phi_i]) for yi in y for phi_i in phi]
         return np.array([x0 for x0 in poses if self.arm.solve_ik(x0) is not None])
 
+    @property
+    def y_range(self) -> tuple[float, float]:
+        """The ends of the positions for which `phi_range` knows orientations, metres."""
+        positions, _ = self._phi_ends
+        return float(positions[0]), float(positions[-1])
+
     def phi_range(self, y: float) -> tuple[Vector, Vector]:
         """Returns the ends (low, high) of the possible orientations at y, and their slopes.
 
         Interpolated between positions 5 mm apart and kept 1e-3 rad inside.
 
         Args:
-            y: Position on the line, metres.
+            y: Position on the line within `y_range`, metres.
 
         Returns:
             The ends, shape (2,), radians, and their derivatives by y, shape (2,), rad/m.
@@ -73,9 +79,11 @@ class HandPoses:
             first, last = runs[np.argmax(runs[:, 1] - runs[:, 0])] - [0, 1]
             low = coarse[0] if first == 0 else self._edge(y, coarse[first], coarse[first - 1])
             high = coarse[-1] if last == 180 else self._edge(y, coarse[last], coarse[last + 1])
-            positions.append(y)
             # A margin for the error of interpolating between positions.
-            ends.append([low + 1e-3, high - 1e-3])
+            low, high = low + 1e-3, high - 1e-3
+            if low <= high:
+                positions.append(y)
+                ends.append([low, high])
         return np.array(positions), np.array(ends)
 
     def _possible(self, y: float, phi: float) -> bool:

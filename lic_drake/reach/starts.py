@@ -1,5 +1,6 @@
 """Which initial conditions, hand pose x0 and base b0, are possible (paper Eqs. 3 and 4)."""
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property, lru_cache
 from typing import NamedTuple, Protocol, Self
@@ -96,6 +97,15 @@ class Starts(Protocol):
     def lattice(self) -> InitialConditions:
         """A denser set."""
         ...
+
+
+def find_region(regions: Sequence[Region], x0: Vector, p_WR: Vector) -> Region:
+    """Returns the region that holds an initial condition, up to the rounding of grids.
+
+    Raises:
+        StopIteration: None does.
+    """
+    return next(region for region in regions if region.holds(x0, p_WR, 1e-5))
 
 
 def is_possible(starts: Starts, x0: Vector, p_WR: Vector) -> bool:

@@ -56,12 +56,7 @@ class RandomSelector:
     def select(self, situation: Situation) -> Selection:
         """Draws a start."""
         began = time.perf_counter()
-        grid = situation.starts.grid
-        used = np.zeros(len(grid.x0), dtype=bool)
-        for failed in situation.failed:
-            same_pose = np.all(np.isclose(grid.x0, failed.x0), axis=1)
-            used |= same_pose & np.all(np.isclose(grid.p_WR, failed.p_WR), axis=1)
-        choices = grid.take(~used)
+        choices = situation.starts.grid.take(situation.untried(situation.starts.grid))
         if len(choices.x0) == 0:
             raise RequestError("all discrete starts have failed; no start is left to draw")
         i = self.rng.integers(len(choices.x0))

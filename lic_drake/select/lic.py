@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 
 from lic_drake.errors import RequestError
 from lic_drake.estimate.checks import EstimateError
-from lic_drake.reach.starts import InitialConditions, Region, is_possible
+from lic_drake.reach.starts import InitialConditions, Region, find_region, is_possible
 from lic_drake.robots.planar import PlanarArm
 from lic_drake.select.baselines import make_selection
 from lic_drake.select.objective import Objective, SuccessModel
@@ -115,7 +115,7 @@ class LicSelector:
         p_WR: Vector,
     ) -> InitialConditions | None:
         """Returns where the optimisation ends from a candidate, None if that is not possible."""
-        region = _region_of(regions, x0, p_WR)
+        region = find_region(regions, x0, p_WR)
         q = self._arm.solve_ik(x0 - [*p_WR, 0.0])
         if q is None:
             return None
@@ -143,10 +143,12 @@ class LbfgsbSelector(LicSelector):
         p_WR: Vector,
     ) -> InitialConditions | None:
         poses = situation.starts.poses
-        region = _region_of(regions, x0, p_WR)
+        region = find_region(regions, x0, p_WR)
         # Moving the base to the left moves the hand to the right of it.
-        y_low = region.lower[1] - region.base_upper[1]
-        y_high = region.upper[1] - region.base_lower[1]
+        y_low = max(region.lower[1] - region.base_upper[1], poses.y_range[0])
+        y_high = min(region.upper[1] - region.base_lower[1], poses.y_range[1])
+        if y_low > y_high:
+            return None
         base_moves = region.base_lower[1] < region.base_upper[1]
 
         def condition(y_s: Vector) -> tuple[Vector, Vector, Vector, Vector]:
@@ -182,8 +184,3 @@ class LbfgsbSelector(LicSelector):
         if not is_possible(situation.starts, x0, p_WR):
             return None
         return InitialConditions(x0[None], p_WR[None])
-
-
-def _region_of(regions: tuple[Region, ...], x0: Vector, p_WR: Vector) -> Region:
-    """Returns the region that holds an initial condition, up to the rounding of grids."""
-    return next(region for region in regions if region.holds(x0, p_WR, 1e-5))

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -13,9 +14,10 @@ from lic_drake.reach.starts import InitialConditions, Region, Starts
 
 Vector = NDArray[np.float64]
 
-RETRY_DISTANCE_M = 0.1
-"""A second attempt of COST starts further than this from the first along y: the "local
-neighborhood" of paper VI-A, whose size it does not state; one grid step."""
+RETRY_DISTANCES_M = (0.1, 0.05, 0.025, 0.0, -1.0)
+"""A further attempt starts more than the first of these from all failed ones along y: the "local
+neighborhood" of paper VI-A, whose size it does not state; one grid step. Where that leaves no
+start, after many failures, the next of them counts; -1 excludes nothing."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,17 +68,39 @@ class Situation:
         if self.p_WG.shape != (3,) or not np.all(np.isfinite(self.p_WG)):
             raise RequestError(f"a goal is three finite numbers in metres, got {self.p_WG}")
 
+    @cached_property
+    def retry_distance_m(self) -> float:
+        """How far from failed attempts a further one starts, along y, metres."""
+        return next(
+            (d for d in RETRY_DISTANCES_M if np.any(self._away(self.starts.grid, d))),
+            RETRY_DISTANCES_M[-1],
+        )
+
     def allowed(self, conditions: InitialConditions) -> NDArray[np.bool_]:
-        """Tells which of n initial conditions are far enough from all failed ones, shape (n,)."""
-        far = np.ones(len(conditions.x0), dtype=bool)
+        """Tells which of n initial conditions are far enough from all failed ones, shape (n,).
+
+        None of them is one that failed.
+        """
+        return self._away(conditions, self.retry_distance_m)
+
+    def untried(self, conditions: InitialConditions) -> NDArray[np.bool_]:
+        """Tells which of n initial conditions have not failed themselves, shape (n,)."""
+        return self._away(conditions, RETRY_DISTANCES_M[-1])
+
+    def _away(self, conditions: InitialConditions, distance_m: float) -> NDArray[np.bool_]:
+        away = np.ones(len(conditions.x0), dtype=bool)
         for failed in self.failed:
-            far &= np.abs(conditions.x0[:, 1] - failed.x0[1]) > RETRY_DISTANCE_M + 1e-9
-        return far
+            same_pose = np.all(np.isclose(conditions.x0, failed.x0), axis=1)
+            away &= ~(same_pose & np.all(np.isclose(conditions.p_WR, failed.p_WR), axis=1))
+            away &= np.abs(conditions.x0[:, 1] - failed.x0[1]) > distance_m + 1e-9
+        return away
 
     def free_regions(self) -> tuple[Region, ...]:
         """Returns the parts of the starts' regions that are away from all failed attempts."""
         regions = self.starts.regions
-        margin = RETRY_DISTANCE_M + 1e-6
+        if self.retry_distance_m < 0.0:
+            return regions
+        margin = self.retry_distance_m + 1e-6
         for failed in self.failed:
             y = failed.x0[1]
             cut = []

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from lic_drake.clutter import registry
+from lic_drake.clutter.aperture import CylinderApertureClutter
 from lic_drake.clutter.cylinder import CylinderClutter
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.clutter.passage import PassageClutter
@@ -39,7 +40,11 @@ def _restore(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 @pytest.mark.parametrize(
     ("name", "sampler"),
-    [("cylinder-clutter", CylinderClutter), ("passage-clutter", PassageClutter)],
+    [
+        ("cylinder-clutter", CylinderClutter),
+        ("passage-clutter", PassageClutter),
+        ("cylinder-aperture-clutter", CylinderApertureClutter),
+    ],
 )
 def test_the_papers_categories_are_known(name: str, sampler: type) -> None:
     assert get_category(name) is sampler

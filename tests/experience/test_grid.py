@@ -17,7 +17,7 @@ SCENARIO = load_scenario("cylinder-clutter")
 
 def test_the_papers_library_has_18900_different_reaches() -> None:
     request = CollectionRequest(scenario=SCENARIO)
-    assert (len(request.goals()), len(request.starts())) == (45, 21)
+    assert (len(request.goals()), len(request.starts().x0)) == (45, 21)
     assert len(request.environment_indices) * len(request.reaches(0)) == 18_900
     assert len({item.key for e in (0, 19) for item in request.reaches(e)}) == 2 * 945
 
@@ -25,7 +25,7 @@ def test_the_papers_library_has_18900_different_reaches() -> None:
 def test_the_papers_library_of_passages_has_1680_different_reaches() -> None:
     scenario = load_scenario("passage-clutter")
     request = CollectionRequest(scenario=scenario, environments=120)
-    assert (len(request.goals()), len(request.starts())) == (1, 14)
+    assert (len(request.goals()), len(request.starts().x0)) == (1, 14)
     reaches = [item for environment in range(120) for item in request.reaches(environment)]
     assert len({item.key for item in reaches}) == len(reaches) == 1680
     # Each environment has a goal of its own, the one that trials there ask for.
@@ -50,7 +50,7 @@ def test_thinning_is_even_and_keeps_the_order(max_goals: int, max_starts: int) -
     request = make_request(max_goals=max_goals, max_starts=max_starts)
     for thinned, grid in (
         (request.goals(), SCENARIO.task.goal_area.grid()),
-        (request.starts(), SCENARIO.task.start_line.grid(SCENARIO.arm())),
+        (request.starts().x0, SCENARIO.task.start_line.grid(SCENARIO.arm())),
     ):
         count = min(max_goals if len(grid) == 45 else max_starts, len(grid))
         rows = [np.flatnonzero((grid == row).all(axis=1))[0] for row in thinned]

@@ -12,8 +12,9 @@ from reaches import free_space, reach_request, small_clutter
 from worlds import cylinder, make_clutter
 
 from lic_drake.errors import LicError
+from lic_drake.reach.environment import Environment
 from lic_drake.reach.recording import PAUSE_S, ReachRecording, frame_rate
-from lic_drake.reach.rollout import run_reach
+from lic_drake.reach.rollout import run_reach, simulate_request
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.trace import ReachTrace
 
@@ -48,7 +49,11 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[ReachTrace]
     scenario = free_space(1.0)
     clutter = make_clutter(cylinder(0.5, 0.35, movable=True), cylinder(0.9, 0.6))
     recording = ReachRecording(scenario, clutter)
-    reaches = [recording.add_reach(EASY_START, p) for p in (P_WG, P_WG * [1, -1, 1])]
+    environment = Environment(scenario, clutter)
+    goals = (P_WG, P_WG * [1, -1, 1])
+    reaches = [environment.reach(p_WG, EASY_START, keep_states=True) for p_WG in goals]
+    for result, p_WG in zip(reaches, goals, strict=True):
+        recording.add_reach(result.trace, p_WG)
     path = tmp_path_factory.mktemp("recording") / "reach.html"
     recording.save(path)
     assert all(outcome == "timeout" and not detail for outcome, _, detail in reaches)
@@ -98,14 +103,15 @@ def test_a_recorded_reach_is_the_simulated_one(environment: int) -> None:
     request = reach_request(scenario, (0.7, 0.0), 0.0, 90.0, environment=environment)
     expected = run_reach(request)
     assert expected.peak_contacts > 0
-    recording = ReachRecording(scenario, scenario.sample_instance("training", environment))
     for _ in range(2):
-        x0, p_WG = np.array(request.start), np.array(request.goal)
-        outcome, trace, detail = recording.add_reach(x0, p_WG)
+        outcome, trace, detail = simulate_request(request, keep_states=True)
         assert (outcome, detail) == (expected.outcome, expected.detail)
         assert trace.time_s[-1] == expected.duration_s
         assert tuple(trace.q[-1]) == expected.q_final
         assert max(trace.peak_force) == expected.peak_force
+        # What is drawn: the whole scene at every sample, as the rollout read it.
+        assert [tuple(state.q) for state in trace.states] == [tuple(q) for q in trace.q]
+        np.testing.assert_array_equal(trace.states[-1].p_WO, trace.p_WO)
 
 
 @pytest.mark.parametrize(("control", "frames"), [(25, 25), (100, 25), (30, 30), (31, 15.5), (1, 1)])
@@ -115,9 +121,12 @@ def test_frames_are_drawn_at_control_instants(control: float, frames: float) -> 
 
 def test_a_start_that_touches_is_told_and_the_recording_goes_on(tmp_path: Path) -> None:
     scenario = free_space(0.2)
-    recording = ReachRecording(scenario, make_clutter(cylinder(*EASY_START[:2])))
-    assert recording.add_reach(EASY_START, P_WG)[0] == "invalid_start"
-    assert recording.add_reach(EASY_START + [0.0, 0.1, 0.0], P_WG)[0] == "timeout"
+    clutter = make_clutter(cylinder(*EASY_START[:2]))
+    recording, environment = ReachRecording(scenario, clutter), Environment(scenario, clutter)
+    for x0, expected in ((EASY_START, "invalid_start"), (EASY_START + [0, 0.1, 0], "timeout")):
+        result = environment.reach(P_WG, x0, keep_states=True)
+        assert result.outcome == expected
+        recording.add_reach(result.trace, P_WG)
     recording.save(tmp_path / "reach.html")
     assert (tmp_path / "reach.html").stat().st_size > 100_000
 
@@ -134,8 +143,10 @@ def test_what_cannot_be_written_is_one_clear_error(tmp_path: Path) -> None:
 @pytest.mark.browser
 def test_a_browser_shows_arm_clutter_goal_and_start_line(tmp_path: Path, chromium: str) -> None:
     scenario = load_scenario("cylinder-clutter", "{stop: {timeout_s: 0.4}}")
-    recording = ReachRecording(scenario, scenario.sample_instance("evaluation", 0))
-    recording.add_reach(EASY_START, P_WG)
+    instance = scenario.sample_instance("evaluation", 0)
+    recording = ReachRecording(scenario, instance)
+    result = Environment(scenario, instance).reach(P_WG, EASY_START, keep_states=True)
+    recording.add_reach(result.trace, P_WG)
     recording.save(tmp_path / "reach.html")
     picture = tmp_path / "reach.png"
     command = [

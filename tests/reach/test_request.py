@@ -11,7 +11,16 @@ from fake_reach import make_record
 from reaches import reach_request
 
 from lic_drake.errors import RequestError
-from lic_drake.reach.request import ReachRecord, ReachRequest, check_goal, make_request
+from lic_drake.experience.schema import to_records
+from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.paths import shipped_library
+from lic_drake.reach.request import (
+    ReachRecord,
+    ReachRequest,
+    check_goal,
+    make_request,
+    request_of,
+)
 from lic_drake.reach.scenario import load_scenario
 
 SCENARIO = load_scenario("cylinder-clutter")
@@ -107,7 +116,7 @@ def test_a_records_goal_and_start_are_vectors() -> None:
 
 def test_every_field_of_a_record_says_what_it_is() -> None:
     for item in dataclasses.fields(ReachRecord):
-        assert item.metadata["unit"] in ("", "m", "rad", "m/s", "N", "s")
+        assert set(item.metadata["unit"].split(", ")) <= {"", "m", "rad", "m/s", "N", "s"}
         assert item.metadata["doc"]
 
 
@@ -131,3 +140,59 @@ def test_goals_out_of_reach_are_refused_with_the_distance() -> None:
     )
     with pytest.raises(RequestError):
         check_goal(SCENARIO, np.array([reach + 1e-6, 0.0, 0.0]))
+
+
+# A base that moves, and reaches that went before
+
+
+def test_the_keys_of_the_shipped_libraries_are_those_of_their_requests() -> None:
+    # A base at the origin and no earlier reach leave keys as they were before there was either.
+    for name in ("cylinder-clutter", "passage-clutter"):
+        library = ExperienceLibrary(shipped_library(name))
+        scenario, records = library.scenario(), to_records(library.table().slice(0, 400))
+        for record in records:
+            request = request_of(record, scenario)
+            assert (request.base, request.after) == ((0.0, 0.0), ())
+            assert request.key == record.key
+            assert request == make_request(
+                scenario, record.stream, record.environment, record.p_WG, record.x0
+            )
+
+
+def test_a_base_or_an_earlier_reach_makes_another_key() -> None:
+    request = reach_request(SCENARIO)
+    x0, here = np.array(request.start), np.zeros(2)
+    second = request.then(x0, here)
+    twins = [
+        request,
+        replace(request, base=(0.0, 0.1)),
+        replace(request, base=(0.1, 0.0)),
+        replace(request, base=(0.0, 5e-324)),
+        second,
+        second.then(x0, here),
+        request.then(x0, np.array([0.0, 0.1])),
+        replace(request, base=(0.0, 0.1)).then(x0, here),
+        request.then(x0 + [0.0, 0.0, 1e-15], here),
+        replace(request, start=(0.335, 0.1, 1.0)).then(x0, here),
+    ]
+    assert len({twin.key for twin in twins}) == len(twins)
+    assert all(len(twin.key) == 16 for twin in twins)
+
+
+def test_a_base_of_minus_zero_is_at_the_origin() -> None:
+    request = reach_request(SCENARIO)
+    x0, p_WG = np.array(request.start), np.array(request.goal)
+    minus = make_request(SCENARIO, "training", 0, p_WG, x0, np.array([-0.0, -0.0]))
+    assert minus.key == request.key
+    assert request.then(x0, np.array([-0.0, 0.0])).key == request.then(x0, np.zeros(2)).key
+
+
+def test_a_base_is_given_in_the_plane_or_in_space() -> None:
+    request = reach_request(SCENARIO)
+    x0, p_WG = np.array(request.start), np.array(request.goal)
+    for p_WR in (np.array([0.1, -0.2]), np.array([0.1, -0.2, 0.0])):
+        made = make_request(SCENARIO, "training", 0, p_WG, x0, p_WR)
+        assert made.base == (0.1, -0.2)
+        np.testing.assert_array_equal(made.p_WR, [0.1, -0.2, 0.0])
+        assert request.then(x0, p_WR).base == (0.1, -0.2)
+        assert all(type(value) is float for value in made.base)

@@ -16,6 +16,7 @@ from lic_drake.control.mpc_config import ijrr_2013
 from lic_drake.errors import LicError, ScenarioError
 from lic_drake.paths import scenarios_dir
 from lic_drake.reach.scenario import Scenario, load_scenario, parse_scenario, to_dict
+from lic_drake.reach.task import BaseTrack
 
 SHIPPED = sorted(path.stem for path in scenarios_dir().glob("*.yaml"))
 TEXT = (scenarios_dir() / "cylinder-clutter.yaml").read_text(encoding="utf-8")
@@ -232,6 +233,8 @@ def leaves(section: Any) -> Iterator[tuple[Any, str]]:
 
 def changed(value: Any) -> Any:
     match value:
+        case None:
+            return BaseTrack()
         case bool():
             return not value
         case str():
@@ -244,15 +247,16 @@ def changed(value: Any) -> Any:
             return 1.0 if math.isinf(value) else math.nextafter(value, math.inf)
 
 
-def test_the_digest_changes_with_every_value_by_as_little_as_one_bit() -> None:
-    scenario = load_scenario("cylinder-clutter")
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_digest_changes_with_every_value_by_as_little_as_one_bit(name: str) -> None:
+    scenario = load_scenario(name)
     digests = [scenario.digest]
     for owner, name in leaves(scenario):
         value = getattr(owner, name)
         setattr(owner, name, changed(value))
         digests.append(scenario.digest)
         setattr(owner, name, value)
-    assert len(digests) > 50
+    assert len(digests) > 40
     assert len(set(digests)) == len(digests)
     assert scenario.digest == digests[0]
 

@@ -1,17 +1,24 @@
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chisquare
+from starts import APERTURES, LINE
 
 from lic_drake.errors import RequestError
-from lic_drake.reach.task import StartLine
-from lic_drake.robots.planar import planar_arm
-from lic_drake.select.baselines import CostSelector, RandomSelector, corridor_cost
-from lic_drake.select.situation import Situation, StartSet
+from lic_drake.select.baselines import (
+    CostSelector,
+    RandomSelector,
+    corridor_cost,
+    make_selection,
+)
+from lic_drake.select.situation import FailedReach, Situation
 
-STARTS = StartSet(arm=planar_arm(), line=StartLine())
 GOAL = np.array([0.6, 0.1, 0.0])
+
+
+def failed(*starts: np.ndarray) -> tuple[FailedReach, ...]:
+    return tuple(FailedReach.from_start(x0) for x0 in starts)
 
 
 def test_cost_of_a_hand_that_points_at_the_goal_is_its_own_corridor() -> None:
@@ -38,39 +45,89 @@ def test_cost_grows_with_distance_and_with_the_angle_to_the_goal(
 
 def test_random_selector_draws_every_start_equally_often() -> None:
     selector = RandomSelector(rng=np.random.default_rng(1))
-    situation = Situation(p_WG=GOAL, starts=STARTS)
+    situation = Situation(p_WG=GOAL, starts=LINE)
     drawn = [tuple(selector.select(situation).x0) for _ in range(4200)]
-    counts = [drawn.count(tuple(x0)) for x0 in STARTS.grid]
+    counts = [drawn.count(tuple(x0)) for x0 in LINE.grid.x0]
     assert sum(counts) == 4200
     assert chisquare(counts).pvalue > 1e-3
 
 
 def test_random_selector_does_not_repeat_failed_starts() -> None:
-    failed = tuple(STARTS.grid[:-1])
+    grid = LINE.grid.x0
     selector = RandomSelector(rng=np.random.default_rng(1))
-    situation = Situation(p_WG=GOAL, starts=STARTS, failed=failed)
-    assert np.array_equal(selector.select(situation).x0, STARTS.grid[-1])
+    situation = Situation(p_WG=GOAL, starts=LINE, failed=failed(*grid[:-1]))
+    assert np.array_equal(selector.select(situation).x0, grid[-1])
     with pytest.raises(RequestError, match="no start is left"):
-        selector.select(Situation(p_WG=GOAL, starts=STARTS, failed=tuple(STARTS.grid)))
+        selector.select(Situation(p_WG=GOAL, starts=LINE, failed=failed(*grid)))
+
+
+def test_random_selector_tries_every_pose_and_base_once_before_it_gives_up() -> None:
+    selector, seen = RandomSelector(rng=np.random.default_rng(1)), []
+    for _ in range(len(APERTURES.grid.x0)):
+        situation = Situation(p_WG=GOAL, starts=APERTURES, failed=tuple(seen))
+        chosen = selector.select(situation)
+        seen.append(FailedReach.from_start(chosen.x0, chosen.p_WR))
+    pairs = {(*reach.x0, *reach.p_WR) for reach in seen}
+    assert len(pairs) == len(seen)
+    # Many of them are the same pose with another base.
+    assert len({tuple(reach.x0) for reach in seen}) < len(seen)
+    assert pairs == {(*x0, *p_WR) for x0, p_WR in zip(*APERTURES.grid, strict=True)}
+    with pytest.raises(RequestError, match="no start is left"):
+        selector.select(Situation(p_WG=GOAL, starts=APERTURES, failed=tuple(seen)))
 
 
 def test_cost_selector_takes_the_cheapest_start() -> None:
-    chosen = CostSelector().select(Situation(p_WG=GOAL, starts=STARTS))
-    costs = corridor_cost(STARTS.grid, GOAL)
+    chosen = CostSelector().select(Situation(p_WG=GOAL, starts=LINE))
+    costs = corridor_cost(LINE.grid.x0, GOAL)
     assert corridor_cost(chosen.x0[None], GOAL)[0] == costs.min()
     assert chosen.probability is None
 
 
 def test_second_cost_selection_is_the_best_away_from_the_first() -> None:
-    first = CostSelector().select(Situation(p_WG=GOAL, starts=STARTS))
-    second = CostSelector().select(Situation(p_WG=GOAL, starts=STARTS, failed=(first.x0,)))
-    away = np.abs(STARTS.grid[:, 1] - first.x0[1]) > 0.1 + 1e-6
+    grid = LINE.grid.x0
+    first = CostSelector().select(Situation(p_WG=GOAL, starts=LINE))
+    second = CostSelector().select(Situation(p_WG=GOAL, starts=LINE, failed=failed(first.x0)))
+    away = np.abs(grid[:, 1] - first.x0[1]) > 0.1 + 1e-6
     assert abs(second.x0[1] - first.x0[1]) > 0.1
     assert corridor_cost(second.x0[None], GOAL)[0] == pytest.approx(
-        corridor_cost(STARTS.grid[away], GOAL).min()
+        corridor_cost(grid[away], GOAL).min()
     )
 
 
-def test_selected_joint_angles_put_the_hand_at_the_start() -> None:
-    chosen = CostSelector().select(Situation(p_WG=GOAL, starts=STARTS))
-    np.testing.assert_allclose(STARTS.arm.tip_pose(chosen.q), chosen.x0, atol=1e-12)
+@settings(max_examples=30)
+@given(st.floats(0.45, 0.85), st.floats(-0.4, 0.4))
+def test_of_equally_cheap_starts_cost_takes_the_base_nearest_to_the_goals_y(
+    x: float, y: float
+) -> None:
+    p_WG = np.array([x, y, 0.0])
+    chosen = CostSelector().select(Situation(p_WG=p_WG, starts=APERTURES))
+    grid = APERTURES.grid
+    costs = np.array([corridor_cost(x0[None], p_WG)[0] for x0 in grid.x0])
+    equal = costs <= costs.min() + 1e-9
+    assert np.unique(grid.p_WR[equal], axis=0).shape[0] > 1
+    assert corridor_cost(chosen.x0[None], p_WG)[0] == pytest.approx(costs.min(), abs=1e-9)
+    nearest = np.abs(grid.p_WR[equal, 1] - y).min()
+    assert abs(chosen.p_WR[1] - y) == pytest.approx(nearest, abs=1e-9)
+
+
+@pytest.mark.parametrize("starts", [LINE, APERTURES])
+def test_selected_joint_angles_put_the_hand_at_the_start(starts) -> None:
+    chosen = CostSelector().select(Situation(p_WG=GOAL, starts=starts))
+    pose = starts.poses.arm.tip_pose(chosen.q) + [*chosen.p_WR, 0.0]
+    np.testing.assert_allclose(pose, chosen.x0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("x0", "p_WR"),
+    [
+        ([0.335, 0.3, 0.0], [0.0, 0.0]),  # Beyond the joint limits.
+        ([0.4, 0.0, 1.0], [0.0, 0.0]),  # Off the line.
+        ([0.335, 0.0, 1.0], [0.1, 0.0]),  # On a base that does not move.
+    ],
+)
+def test_a_start_that_is_not_possible_is_never_a_selection(
+    x0: list[float], p_WR: list[float]
+) -> None:
+    situation = Situation(p_WG=GOAL, starts=LINE)
+    with pytest.raises(RequestError, match="the arm cannot start at"):
+        make_selection(situation, np.array(x0), np.array(p_WR), None, "test", 0.0)

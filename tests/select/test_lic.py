@@ -1,40 +1,63 @@
 import numpy as np
 import pytest
-from select_surfaces import Bumps, random_bumps
+from select_surfaces import Bumps, random_bumps, random_model
+from starts import APERTURES, ARM, LINE, aperture_starts, assert_possible, dense_scan
 
 from lic_drake.errors import RequestError
+from lic_drake.estimate.categories import features_of
 from lic_drake.estimate.features import PLANAR_LIC1
-from lic_drake.reach.task import StartLine
-from lic_drake.robots.planar import planar_arm
+from lic_drake.reach.starts import InitialConditions, Starts
 from lic_drake.select.lic import LbfgsbSelector, LicSelector
-from lic_drake.select.situation import Situation, StartSet
+from lic_drake.select.objective import SuccessModel
+from lic_drake.select.situation import FailedReach, Selection, Situation
 
-ARM = planar_arm()
-STARTS = StartSet(arm=ARM, line=StartLine())
 GOAL = np.array([0.6, 0.1, 0.0])
+FIRST = Situation(p_WG=GOAL, starts=LINE)
+SECOND_MODEL = features_of("cylinder-clutter").second
 
 
-def _best_of_dense_scan(selector: LicSelector, situation: Situation) -> float:
-    scan = STARTS.scan(161, 181)
-    return float(selector.evaluate(GOAL, scan[situation.allowed(scan)]).max())
+def lic(surface: Bumps, kind: type[LicSelector] = LicSelector) -> LicSelector:
+    return kind(ARM, SuccessModel(estimator=surface, features=PLANAR_LIC1))
+
+
+def value_of(selector: LicSelector, situation: Situation, chosen: Selection) -> float:
+    """LIC-1's estimate for a choice, from its estimator alone."""
+    y = chosen.x0[1] - chosen.p_WR[1]
+    goal = situation.p_WG[:2] - chosen.p_WR
+    return float(selector.first.estimator.values(np.array([[*goal, y, chosen.x0[2]]]))[0])
+
+
+def best_of_dense_scan(selector: LicSelector, situation: Situation) -> float:
+    scan = dense_scan(situation.starts)
+    return float(selector.objective(situation).values(scan.take(situation.allowed(scan))).max())
+
+
+def failed_at(
+    x0: np.ndarray, final: tuple[float, float] = (0.45, 0.05), p_WR: np.ndarray | None = None
+) -> FailedReach:
+    """A failure that began at x0 and ended with the hand at `final`."""
+    known = FailedReach.from_start(x0, p_WR)
+    names = ("final_x", "final_y", "final_phi", "final_vx", "final_vy")
+    shown = dict(zip(names, (*final, 0.3, 0.01, -0.02), strict=True))
+    return FailedReach(x0=x0, p_WR=known.p_WR, shown={**known.shown, **shown})
+
+
+# A fixed base
 
 
 def test_peak_inside_the_feasible_set_is_found_exactly() -> None:
     peak = np.array([0.013, 1.0])
-    surface = Bumps(peak[None], np.array([0.9]), np.array([0.2, 0.6]))
-    chosen = LicSelector(ARM, surface, PLANAR_LIC1).select(Situation(p_WG=GOAL, starts=STARTS))
+    chosen = lic(Bumps(peak[None], np.array([0.9]), np.array([0.2, 0.6]))).select(FIRST)
     np.testing.assert_allclose(chosen.x0[1:], peak, atol=1e-3)
     assert chosen.probability == pytest.approx(0.9, abs=1e-5)
 
 
 def test_peak_that_the_arm_cannot_take_gives_the_best_start_at_the_joint_limits() -> None:
     # A hand at y = 0.3 m cannot point straight ahead: phi must be at least 52 degrees there.
-    surface = Bumps(np.array([[0.3, 0.0]]), np.array([0.9]), np.array([0.1, 0.4]))
-    selector = LicSelector(ARM, surface, PLANAR_LIC1)
-    situation = Situation(p_WG=GOAL, starts=STARTS)
-    chosen = selector.select(situation)
+    selector = lic(Bumps(np.array([[0.3, 0.0]]), np.array([0.9]), np.array([0.1, 0.4])))
+    chosen = selector.select(FIRST)
     assert chosen.probability is not None
-    assert chosen.probability >= 0.99 * _best_of_dense_scan(selector, situation)
+    assert chosen.probability >= 0.99 * best_of_dense_scan(selector, FIRST)
     margin = np.min(np.minimum(chosen.q - ARM.q_min, ARM.q_max - chosen.q))
     assert 0.0 <= margin + 1e-9 < np.deg2rad(2.0)
 
@@ -44,32 +67,207 @@ def test_peak_that_the_arm_cannot_take_gives_the_best_start_at_the_joint_limits(
 def test_selection_matches_a_dense_scan_and_beats_every_grid_start(
     kind: type[LicSelector], seed: int
 ) -> None:
-    selector = kind(ARM, random_bumps(seed), PLANAR_LIC1)
-    situation = Situation(p_WG=GOAL, starts=STARTS)
-    chosen = selector.select(situation)
-    value = float(selector.evaluate(GOAL, chosen.x0[None])[0])
-    assert value >= selector.evaluate(GOAL, STARTS.grid).max() - 1e-12
-    assert value >= 0.99 * _best_of_dense_scan(selector, situation)
+    selector = lic(random_bumps(seed), kind)
+    chosen = selector.select(FIRST)
+    value = value_of(selector, FIRST, chosen)
+    assert value >= selector.objective(FIRST).values(LINE.grid).max() - 1e-12
+    assert value >= 0.99 * best_of_dense_scan(selector, FIRST)
+    assert chosen.probability == pytest.approx(min(value, 1.0), abs=1e-12)
+    assert_possible(LINE, chosen.x0, chosen.p_WR, chosen.q)
 
 
+@pytest.mark.parametrize("kind", [LicSelector, LbfgsbSelector])
 @pytest.mark.parametrize("seed", range(5))
-def test_second_selection_keeps_away_from_the_first_and_is_the_best_there(seed: int) -> None:
-    selector = LicSelector(ARM, random_bumps(seed), PLANAR_LIC1)
-    first = selector.select(Situation(p_WG=GOAL, starts=STARTS))
-    situation = Situation(p_WG=GOAL, starts=STARTS, failed=(first.x0,))
+def test_second_selection_keeps_away_from_the_first_and_is_the_best_there(
+    kind: type[LicSelector], seed: int
+) -> None:
+    selector = lic(random_bumps(seed), kind)
+    first = selector.select(FIRST)
+    failed = (FailedReach.from_start(first.x0),)
+    situation = Situation(p_WG=GOAL, starts=LINE, failed=failed)
     second = selector.select(situation)
     assert abs(second.x0[1] - first.x0[1]) > 0.1
-    value = float(selector.evaluate(GOAL, second.x0[None])[0])
-    assert value >= 0.99 * _best_of_dense_scan(selector, situation)
+    value = value_of(selector, situation, second)
+    assert value >= 0.99 * best_of_dense_scan(selector, situation)
+
+
+def test_where_failures_leave_no_start_at_a_distance_a_nearer_one_is_chosen() -> None:
+    failed = tuple(
+        FailedReach.from_start(np.array([0.335, y, 1.0])) for y in np.arange(-0.34, 0.4, 0.1)
+    )
+    selector = lic(random_bumps(0))
+    situation = Situation(p_WG=GOAL, starts=LINE, failed=failed)
+    chosen = selector.select(situation)
+    distances = [abs(chosen.x0[1] - reach.x0[1]) for reach in failed]
+    assert 0.05 < min(distances) < 0.1
+    value = value_of(selector, situation, chosen)
+    assert value >= 0.99 * best_of_dense_scan(selector, situation)
 
 
 def test_selection_without_a_start_left_is_refused() -> None:
-    failed = tuple(np.array([0.335, y, 1.0]) for y in np.arange(-0.4, 0.41, 0.1))
-    selector = LicSelector(ARM, random_bumps(0), PLANAR_LIC1)
+    every = LINE.grid.join(LINE.lattice)
+    failed = tuple(FailedReach.from_start(x0) for x0 in every.x0)
     with pytest.raises(RequestError, match="no start is left"):
-        selector.select(Situation(p_WG=GOAL, starts=STARTS, failed=failed))
+        lic(random_bumps(0)).select(Situation(p_WG=GOAL, starts=LINE, failed=failed))
 
 
 def test_goal_with_nan_is_refused() -> None:
     with pytest.raises(RequestError, match="finite"):
-        Situation(p_WG=np.array([np.nan, 0.0, 0.0]), starts=STARTS)
+        Situation(p_WG=np.array([np.nan, 0.0, 0.0]), starts=LINE)
+
+
+# Apertures and a mobile base
+
+
+@pytest.mark.parametrize("kind", [LicSelector, LbfgsbSelector])
+@pytest.mark.parametrize("seed", range(5))
+def test_at_apertures_the_choice_matches_a_dense_scan_over_aperture_angle_and_base(
+    kind: type[LicSelector], seed: int
+) -> None:
+    selector = kind(ARM, random_model(seed))
+    situation = Situation(p_WG=np.array([0.65, 0.2 - 0.1 * seed, 0.0]), starts=APERTURES)
+    chosen = selector.select(situation)
+    assert_possible(APERTURES, chosen.x0, chosen.p_WR, chosen.q)
+    value = value_of(selector, situation, chosen)
+    assert value >= 0.99 * best_of_dense_scan(selector, situation)
+    assert chosen.probability == pytest.approx(min(value, 1.0), abs=1e-12)
+
+
+@pytest.mark.parametrize("kind", [LicSelector, LbfgsbSelector])
+def test_a_track_that_ends_early_bounds_the_base(kind: type[LicSelector]) -> None:
+    # The surface wants the hand 0.3 m to the right of the base, which the track's end forbids.
+    starts = aperture_starts([-0.35, 0.05, 0.52])
+    starts.track.y_max_m = 0.1
+    surface = Bumps(np.array([[-0.3, 0.2]]), np.array([0.9]), np.array([0.2, 0.5]))
+    selector = lic(surface, kind)
+    situation = Situation(p_WG=GOAL, starts=starts)
+    chosen = selector.select(situation)
+    assert_possible(starts, chosen.x0, chosen.p_WR, chosen.q)
+    value = value_of(selector, situation, chosen)
+    assert value >= 0.99 * best_of_dense_scan(selector, situation)
+
+
+@pytest.mark.parametrize("kind", [LicSelector, LbfgsbSelector])
+def test_after_a_failure_lic1_takes_the_best_of_the_other_apertures(
+    kind: type[LicSelector],
+) -> None:
+    selector = kind(ARM, random_model(3))
+    first = selector.select(Situation(p_WG=GOAL, starts=APERTURES))
+    failed = (FailedReach.from_start(first.x0, first.p_WR),)
+    situation = Situation(p_WG=GOAL, starts=APERTURES, failed=failed)
+    second = selector.select(situation)
+    assert second.x0[1] != first.x0[1]
+    assert_possible(APERTURES, second.x0, second.p_WR, second.q)
+    value = value_of(selector, situation, second)
+    assert value >= 0.99 * best_of_dense_scan(selector, situation)
+
+
+@pytest.mark.parametrize("kind", [LicSelector, LbfgsbSelector])
+@pytest.mark.parametrize("offset", [(0.0, 0.7), (-0.4, -1.3), (3.0, 20.0)])
+@pytest.mark.parametrize("after_failure", [False, True])
+def test_a_translated_situation_has_the_translated_answer_and_the_same_estimate(
+    kind: type[LicSelector], offset: tuple[float, float], after_failure: bool
+) -> None:
+    # Equation (3): only where things are relative to each other counts.
+    second = random_model(8, SECOND_MODEL)
+    selector = kind(ARM, random_model(7), second if after_failure else None)
+
+    def choose(offset: tuple[float, float]) -> Selection:
+        dx, dy = offset
+        failed = failed_at(
+            np.array([0.335 + dx, 0.05 + dy, 0.2]), (0.5 + dx, 0.1 + dy), np.array([dx, dy])
+        )
+        return selector.select(
+            Situation(
+                p_WG=GOAL + [dx, dy, 0.0],
+                starts=aperture_starts([-0.35, 0.05, 0.52], offset),
+                failed=(failed,) if after_failure else (),
+            )
+        )
+
+    here, there = choose((0.0, 0.0)), choose(offset)
+    assert there.probability == pytest.approx(here.probability, abs=1e-6)
+    np.testing.assert_allclose(there.x0 - [*offset, 0.0], here.x0, atol=2e-3)
+    np.testing.assert_allclose(there.p_WR - offset, here.p_WR, atol=2e-3)
+
+
+# LIC-2
+
+
+@pytest.mark.parametrize("starts", [LINE, APERTURES], ids=["line", "apertures"])
+@pytest.mark.parametrize("kind", [LicSelector, LbfgsbSelector])
+def test_lic2_takes_the_best_of_all_starts_after_what_the_failure_showed(
+    kind: type[LicSelector], starts: Starts
+) -> None:
+    selector = kind(ARM, random_model(1), random_model(2, SECOND_MODEL))
+    answers = []
+    for final in ((0.4, -0.2), (0.7, 0.3)):
+        failed = failed_at(starts.grid.x0[9], final, starts.grid.p_WR[9])
+        situation = Situation(p_WG=GOAL, starts=starts, failed=(failed,))
+        chosen = selector.select(situation)
+        assert_possible(starts, chosen.x0, chosen.p_WR, chosen.q)
+        base = chosen.p_WR
+        z = [
+            *(GOAL[:2] - base),
+            *(failed.x0[1] - base[1], failed.x0[2]),
+            *(np.array(final) - base),
+            *(chosen.x0[1] - base[1], chosen.x0[2]),
+        ]
+        value = float(selector.second.estimator.values(np.array([z]))[0])
+        assert chosen.probability == pytest.approx(min(value, 1.0), abs=1e-9)
+        scan = selector.objective(situation).values(dense_scan(starts))
+        assert value >= 0.99 * scan.max()
+        answers.append(chosen)
+    # What it saw made a difference.
+    assert answers[0].probability != answers[1].probability
+
+
+def test_lic2_may_start_where_the_first_reach_did() -> None:
+    # Its estimate is highest just there, whatever it observes.
+    peak = np.array([[0.05, 0.9]])
+    second = SuccessModel(
+        estimator=Bumps(peak, np.array([0.9]), np.array([0.1, 0.3])), features=SECOND_MODEL
+    )
+    selector = LicSelector(ARM, random_model(1), second)
+    situation = Situation(
+        p_WG=GOAL, starts=LINE, failed=(failed_at(np.array([0.335, 0.05, 0.9])),)
+    )
+    np.testing.assert_allclose(selector.select(situation).x0[1:], peak[0], atol=2e-3)
+
+
+def test_a_failure_that_never_began_leaves_lic1_away_from_it() -> None:
+    selector = LicSelector(ARM, random_model(1), random_model(2, SECOND_MODEL))
+    alone = LicSelector(ARM, random_model(1))
+    first = alone.select(FIRST)
+    for failed in (
+        FailedReach.from_start(first.x0),
+        failed_at(first.x0, (np.nan, np.nan)),
+    ):
+        situation = Situation(p_WG=GOAL, starts=LINE, failed=(failed,))
+        chosen = selector.select(situation)
+        assert abs(chosen.x0[1] - first.x0[1]) > 0.1
+        np.testing.assert_array_equal(chosen.x0, alone.select(situation).x0)
+        assert chosen.probability == alone.select(situation).probability
+
+
+def test_after_several_failures_the_choice_maximises_the_smallest_of_their_estimates() -> None:
+    second = random_model(4, SECOND_MODEL)
+    selector = LicSelector(ARM, random_model(1), second)
+    failed = (
+        failed_at(np.array([0.335, -0.2, 0.5]), (0.4, -0.2)),
+        failed_at(np.array([0.335, 0.2, 1.2]), (0.7, 0.3)),
+        failed_at(np.array([0.335, 0.0, 0.9]), (0.55, 0.0)),
+    )
+    chosen = selector.select(Situation(p_WG=GOAL, starts=LINE, failed=failed))
+
+    def smallest(conditions: InitialConditions) -> np.ndarray:
+        n, estimates = len(conditions.x0), []
+        for reach in failed:
+            seen = [reach.x0[1], reach.x0[2], reach.shown["final_x"], reach.shown["final_y"]]
+            Z = np.column_stack([np.tile([*GOAL[:2], *seen], (n, 1)), conditions.x0[:, 1:]])
+            estimates.append(second.estimator.values(Z))
+        return np.min(estimates, axis=0)
+
+    value = smallest(InitialConditions(chosen.x0[None], chosen.p_WR[None]))[0]
+    assert chosen.probability == pytest.approx(min(value, 1.0), abs=1e-12)
+    assert value >= 0.99 * smallest(dense_scan(LINE)).max()

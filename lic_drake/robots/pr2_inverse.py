@@ -1,0 +1,180 @@
+"""Inverse kinematics of the PR2's right arm in closed form, and Eq. (5) of the paper.
+
+Given where the tool is and which way it points, the wrist is known, and the pan angle alone is
+free: the distance from shoulder to wrist gives the elbow, two upper arm rolls bring the wrist to
+the right side of the shoulder, the lift to the right height; forearm roll and wrist flex then point
+the tool. Elbow and wrist bend one way only, so every pan angle has at most two configurations, and
+a row of pan angles gives all families of them.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from lic_drake.robots.pr2_kinematics import Pr2Kinematics, Vector
+
+NUM_PAN_ANGLES = 271
+"""Pan angles that are tried over the joint's range: one every half degree."""
+
+_SLACK = 1e-12
+"""Cosines and sines may be beyond 1 by this much: rounding must not refuse a straight arm."""
+
+_STRAIGHT = 1e-9
+"""A bend whose sine is below this leaves the roll before it undefined."""
+
+ROBOT_TO_CLUTTER = np.array([1.0, 0.0, 0.0])
+"""The paper's x: from the robot to the clutter."""
+
+
+class _Heading(NamedTuple):
+    """Where wrist and tool lie, seen from the shoulder behind each pan angle; shapes (n, 3)."""
+
+    p_SW: Vector
+    u_S: Vector
+
+
+def solve_pose(
+    kinematics: Pr2Kinematics, p_RE: Vector, R_RE: Vector, pan: Vector | None = None
+) -> Vector:
+    """Returns configurations that bring the tool frame to a pose, shape (n, 7), radians.
+
+    Args:
+        kinematics: The arm.
+        p_RE: Position of the tool frame, shape (3,), metres.
+        R_RE: Its rotation, shape (3, 3).
+        pan: Pan angles to try, shape (k,), radians; by default a row over the joint's range.
+
+    Returns:
+        All configurations within the joint limits, ordered by pan angle. Joints that turn for ever
+        have angles in [-pi, pi).
+    """
+    q = solve_pointing(kinematics, p_RE, R_RE[:, 0], pan)
+    for row in q:
+        R_R6 = kinematics.calc_pose(row.tolist()).R_RL[5]
+        y_6 = R_R6.T @ R_RE[:, 1]
+        row[6] = _wrap(np.arctan2(y_6[2], y_6[1]))
+    return _keep_limits(kinematics, q)
+
+
+def solve_pointing(
+    kinematics: Pr2Kinematics, p_RE: Vector, u_R: Vector, pan: Vector | None = None
+) -> Vector:
+    """Returns configurations that bring the tool to a place and direction, shape (n, 7), radians.
+
+    The wrist roll, which changes neither, is 0: the middle of its range.
+
+    Args:
+        kinematics: The arm.
+        p_RE: Position of the tool frame, shape (3,), metres.
+        u_R: Unit vector along which the tool points, shape (3,).
+        pan: Pan angles to try, shape (k,), radians; by default a row over the joint's range.
+
+    Returns:
+        All configurations within the joint limits, ordered by pan angle, which vary the elbow about
+        the line from shoulder to wrist.
+    """
+    if pan is None:
+        pan = np.linspace(kinematics.q_min[0], kinematics.q_max[0], NUM_PAN_ANGLES)
+    heading = _look_from_shoulder(kinematics, p_RE, u_R, pan)
+    _, upper_arm, forearm, _ = kinematics.lengths
+    cos_elbow = (np.sum(heading.p_SW**2, axis=1) - upper_arm**2 - forearm**2) / (
+        2.0 * upper_arm * forearm
+    )
+    elbow = -np.arccos(np.clip(cos_elbow, -1.0, 1.0))
+    # The wrist in the upper arm's frame: along its x axis, and to the side.
+    along = upper_arm + forearm * np.cos(elbow)
+    aside = -forearm * np.sin(elbow)
+    is_bent = aside > _STRAIGHT
+    sin_roll = np.where(is_bent, -heading.p_SW[:, 1], 0.0) / np.where(is_bent, aside, 1.0)
+    reaches = (np.abs(cos_elbow) <= 1.0 + _SLACK) & (np.abs(sin_roll) <= 1.0 + _SLACK)
+    reaches &= is_bent | (np.abs(heading.p_SW[:, 1]) <= _STRAIGHT)
+    roll = np.arcsin(np.clip(sin_roll, -1.0, 1.0))
+    branches = [
+        _complete(heading, pan, roll, elbow, along, aside),
+        _complete(heading, pan, np.pi - roll, elbow, along, aside),
+    ]
+    q = np.stack(branches, axis=1)[reaches].reshape(-1, 7)
+    # The roll's range is less than a turn, but does not lie about 0.
+    q[:, 2] = kinematics.q_min[2] + np.mod(q[:, 2] - kinematics.q_min[2], 2.0 * np.pi)
+    return _keep_limits(kinematics, q)
+
+
+def calc_preselection_cost(
+    kinematics: Pr2Kinematics,
+    q: Vector,
+    x_R: Vector = ROBOT_TO_CLUTTER,
+    alpha: float = 1.0,
+    beta: float = 1.0,
+) -> Vector:
+    """Returns the cost of Eq. (5), shape (n,), 1/m: low when hand and forearm point to the clutter.
+
+    C = 1 / (alpha |x'p_tw| + beta |x'p_te|), with p_tw and p_te from the tool to wrist and elbow.
+
+    Args:
+        kinematics: The arm.
+        q: Configurations, shape (n, 7), radians.
+        x_R: Unit vector from the robot to the clutter, shape (3,).
+        alpha: Weight of the wrist, positive (the paper does not give it).
+        beta: Weight of the elbow, positive (the paper does not give it).
+    """
+    if not len(q):
+        return np.zeros(0)
+    poses = [kinematics.calc_pose(row.tolist()) for row in q]
+    p_RE = np.array([pose.p_RE for pose in poses])
+    depth = np.array([pose.p_RL[[5, 3]] for pose in poses]) - p_RE[:, None]
+    wrist, elbow = np.abs(depth @ x_R).T
+    cost: Vector = 1.0 / (alpha * wrist + beta * elbow)
+    return cost
+
+
+def _look_from_shoulder(
+    kinematics: Pr2Kinematics, p_RE: Vector, u_R: Vector, pan: Vector
+) -> _Heading:
+    """Returns wrist and pointing direction in the frame of the pan link, moved to the shoulder."""
+    p_AW = p_RE - kinematics.lengths.tool * u_R - kinematics.p_RA
+    c, s = np.cos(kinematics.yaw + pan), np.sin(kinematics.yaw + pan)
+    p_SW, u_S = (
+        np.column_stack([c * v[0] + s * v[1], c * v[1] - s * v[0], np.full(len(pan), v[2])])
+        for v in (p_AW, u_R)
+    )
+    p_SW[:, 0] -= kinematics.lengths.shoulder
+    return _Heading(p_SW, u_S)
+
+
+def _complete(
+    heading: _Heading, pan: Vector, roll: Vector, elbow: Vector, along: Vector, aside: Vector
+) -> Vector:
+    """Returns the configurations of one upper arm roll a pan angle, shape (n, 7)."""
+    x, _, z = heading.p_SW.T
+    up = aside * np.cos(roll)
+    lift = np.arctan2(up * x - along * z, along * x + up * z)
+    ux, uy, uz = heading.u_S.T
+    uz, ux = _turn_back(uz, ux, lift)
+    uy, uz = _turn_back(uy, uz, roll)
+    uz, ux = _turn_back(uz, ux, elbow)
+    bend = np.hypot(uy, uz)
+    wrist = -np.arctan2(bend, ux)
+    forearm_roll = np.where(bend > _STRAIGHT, _wrap(np.arctan2(-uy, uz)), 0.0)
+    return np.column_stack(
+        [pan, lift, roll, elbow, forearm_roll, wrist, np.zeros_like(pan)],
+    )
+
+
+def _turn_back(u: Vector, v: Vector, angle: Vector) -> tuple[Vector, Vector]:
+    """Returns components along the axes of u and v after these have turned from u to v."""
+    c, s = np.cos(angle), np.sin(angle)
+    return c * u + s * v, c * v - s * u
+
+
+def _wrap(angle: Vector) -> Vector:
+    """Returns angles wrapped to [-pi, pi), radians."""
+    wrapped: Vector = np.mod(angle + np.pi, 2.0 * np.pi) - np.pi
+    return wrapped
+
+
+def _keep_limits(kinematics: Pr2Kinematics, q: Vector, tolerance: float = 1e-9) -> Vector:
+    """Returns the rows within the joint limits, what is beyond them by rounding set to them."""
+    low, high = kinematics.q_min, kinematics.q_max
+    legal = np.all((q >= low - tolerance) & (q <= high + tolerance), axis=1)
+    kept: Vector = np.clip(q[legal], low, high)
+    return kept

@@ -1,0 +1,165 @@
+import numpy as np
+import pytest
+from reaches import free_space, reach_request, small_clutter, start_angles
+from worlds import box, cylinder, make_clutter
+
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.reach.environment import Environment
+from lic_drake.reach.rollout import make_record
+from lic_drake.reach.scenario import Scenario, load_scenario
+from lic_drake.reach.trace import ReachResult
+
+X0 = np.array(reach_request(free_space()).start)
+P_WG = np.array([0.6, 0.1, 0.0])
+
+
+def rounded(values: np.ndarray) -> np.ndarray:
+    """Values with so few binary digits that adding a power of two is exact."""
+    return np.round(values * 2**24) / 2**24
+
+
+def reach_moved(
+    scenario: Scenario,
+    instance: ClutterInstance,
+    p_WG: np.ndarray,
+    x0: np.ndarray,
+    offset: np.ndarray,
+) -> ReachResult:
+    """A reach with everything, the base too, moved by an offset."""
+    environment = Environment(scenario, instance.translated(offset), p_WR=offset)
+    return environment.reach(p_WG + offset, x0 + offset, keep_states=True)
+
+
+REACHES = [
+    (0, [0.6, 0.1, 0.0], [0.335, 0.0, np.deg2rad(60.0)]),
+    (0, [0.7, 0.0, 0.0], [0.335, 0.0, np.deg2rad(90.0)]),
+    (1, [0.65, -0.1, 0.0], [0.335, 0.1, np.deg2rad(60.0)]),
+    (2, [0.7, 0.0, 0.0], [0.335, -0.2, np.deg2rad(30.0)]),
+]
+
+
+@pytest.mark.parametrize(("environment", "goal", "start"), REACHES)
+@pytest.mark.parametrize("offset", [[0.0, 0.5, 0.0], [-2.0, 0.25, 0.0]])
+def test_a_reach_is_the_same_wherever_everything_together_is(
+    environment: int, goal: list[float], start: list[float], offset: list[float]
+) -> None:
+    scenario, by = small_clutter(2.5), np.array(offset)
+    drawn = scenario.sample_instance("training", environment)
+    instance = drawn.with_objects_at(rounded(drawn.p_WO[drawn.movable, :2]))
+    instance.p_WO[~instance.movable] = rounded(instance.p_WO[~instance.movable])
+    p_WG, x0 = rounded(np.array(goal)), np.array([*rounded(np.array(start[:2])), start[2]])
+    here = reach_moved(scenario, instance, p_WG, x0, np.zeros(3))
+    there = reach_moved(scenario, instance, p_WG, x0, by)
+    assert here.trace.q and there.outcome == here.outcome
+    # Translations are exact here, so that even contact makes nothing of them.
+    np.testing.assert_array_equal(there.trace.q, here.trace.q)
+    for name in ("time_s", "peak_force", "total_force", "contacts"):
+        assert getattr(there.trace, name) == getattr(here.trace, name)
+    np.testing.assert_allclose(
+        np.array(there.trace.p_WE) - by, np.array(here.trace.p_WE), atol=1e-12
+    )
+    for name in ("p_WO", "v_WO"):
+        moved = np.array([getattr(state, name) for state in there.trace.states])
+        still = np.array([getattr(state, name) for state in here.trace.states])
+        np.testing.assert_allclose(moved - (by[:2] if name == "p_WO" else 0.0), still, atol=1e-12)
+    np.testing.assert_allclose(there.trace.p_WO - by[:2], here.trace.p_WO, atol=1e-12)
+    np.testing.assert_array_equal(there.trace.p_WR, by)
+
+
+def test_some_of_these_reaches_touch_and_push_something() -> None:
+    scenario = small_clutter(2.5)
+    pushed = touched = 0
+    for environment, goal, start in REACHES:
+        instance = scenario.sample_instance("training", environment)
+        trace = Environment(scenario, instance).reach(np.array(goal), np.array(start)).trace
+        touched += max(trace.contacts) > 0
+        pushed += bool(np.any(np.abs(trace.p_WO - instance.p_WO[instance.movable, :2]) > 1e-3))
+    assert touched >= 2
+    assert pushed >= 1
+
+
+def test_a_base_aside_is_what_brings_a_goal_into_reach() -> None:
+    scenario = free_space()
+    far, aside = np.array([0.6, 0.9, 0.0]), np.array([0.0, 0.8, 0.0])
+    nothing = make_clutter()
+    assert Environment(scenario, nothing).reach(far, X0).outcome == "unreachable"
+    environment = Environment(scenario, nothing, p_WR=aside)
+    result = environment.reach(far, X0 + aside)
+    assert result.outcome == "reached"
+    assert np.linalg.norm(result.trace.p_WE[-1] - far) < scenario.stop.success_distance_m
+    # The goal and the start of a base at the origin are both too far for it now.
+    assert environment.reach(np.array([0.6, -0.2, 0.0]), X0 + aside).outcome == "unreachable"
+    assert environment.reach(far, X0).outcome == "invalid_start"
+
+
+def test_a_trace_tells_where_the_base_and_the_objects_are_in_the_world() -> None:
+    base = np.array([0.05, -0.3, 0.0])
+    scenario = free_space(0.2)
+    clutter = make_clutter(cylinder(0.7, 0.4, movable=True), box(0.9, 0.0, (0.1, 0.1, 0.2)))
+    environment = Environment(scenario, clutter, p_WR=base)
+    trace = environment.reach(P_WG + base, X0 + base, keep_states=True).trace
+    np.testing.assert_array_equal(trace.p_WR, base)
+    np.testing.assert_allclose(trace.p_WO, [[0.7, 0.4]], atol=1e-12)
+    for state in trace.states:
+        np.testing.assert_allclose(state.p_WO, [[0.7, 0.4]], atol=1e-12)
+    np.testing.assert_array_equal(trace.q[0], start_angles(scenario))
+    np.testing.assert_allclose(
+        trace.p_WE, [scenario.arm().tip_position(q) + base for q in trace.q], atol=1e-12
+    )
+    np.testing.assert_allclose(trace.p_WE[0][:2], X0[:2] + base[:2], atol=1e-12)
+
+
+def test_a_record_gives_positions_in_the_world_and_the_base() -> None:
+    from dataclasses import replace
+
+    base = (0.0, -0.25)
+    scenario = small_clutter(1.0)
+    request = reach_request(scenario, (0.65, -0.3), y_m=-0.2, phi_deg=60.0)
+    request = replace(request, base=base)
+    instance = scenario.sample_instance(request.stream, request.environment)
+    environment = Environment(scenario, instance, p_WR=np.array([*base, 0.0]))
+    result = environment.reach(np.array(request.goal), np.array(request.start))
+    record = make_record(request, result, 0.0)
+    assert (record.base_x, record.base_y, record.after) == (*base, ())
+    assert (tuple(record.p_WG), tuple(record.x0)) == (request.goal, request.start)
+    arm = scenario.arm()
+    np.testing.assert_allclose(
+        arm.tip_pose(np.array(record.q_start)) + [*base, 0.0], record.x0, atol=1e-12
+    )
+    final = np.array([record.final_x, record.final_y, record.final_phi])
+    np.testing.assert_allclose(
+        final, arm.tip_pose(np.array(record.q_final)) + [*base, 0.0], atol=1e-12
+    )
+    ways = np.linalg.norm(np.array(result.trace.p_WE) - record.p_WG, axis=1)
+    assert record.min_distance == ways.min()
+    # Not that of another frame: the hand came from 0.33 m away.
+    assert record.min_distance < 0.33
+
+
+@pytest.mark.parametrize("sleep", [True, False])
+@pytest.mark.parametrize("fixed", [True, False])
+def test_objects_that_touch_each_other_are_no_reason_to_refuse_a_start(
+    sleep: bool, fixed: bool
+) -> None:
+    scenario = free_space(0.2)
+    pair = [cylinder(0.7, 0.3, movable=True), cylinder(0.7, 0.3199, movable=not fixed)]
+    environment = Environment(scenario, make_clutter(*pair), sleep=sleep)
+    assert environment.reach(P_WG, X0).outcome == "timeout"
+    # An object that the arm touches is one, with or without such a pair.
+    at_the_hand = cylinder(*X0[:2], movable=True)
+    for objects in (pair, []):
+        environment = Environment(scenario, make_clutter(*objects, at_the_hand), sleep=sleep)
+        assert environment.reach(P_WG, X0).outcome == "invalid_start"
+
+
+def test_a_reach_through_an_aperture_touches_no_wall_where_there_is_room() -> None:
+    scenario = load_scenario(
+        "cylinder-aperture-clutter",
+        "{clutter: {num_movable: 0, num_fixed: 0}, stop: {timeout_s: 10}}",
+    )
+    p_WA = scenario.sample_instance("training", 0).p_WA
+    assert p_WA is not None
+    base = np.array([0.0, p_WA[1, 1] + 0.2, 0.0])
+    environment = Environment(scenario, scenario.sample_instance("training", 0), p_WR=base)
+    result = environment.reach(p_WA[1] + [0.2, 0.05, 0.0], np.array([*p_WA[1, :2], 0.3]))
+    assert result.outcome == "reached"

@@ -1,0 +1,219 @@
+import logging
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from pr2_reference import BODIES, FACTS
+from pydrake.geometry import Box, Cylinder, SceneGraph
+from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import ModelInstanceIndex
+
+from lic_drake.robots.pr2_description import (
+    LEFT_ARM_AT_REST,
+    SOFT_LIMITS,
+    TORSO_RANGE_M,
+    add_pr2,
+    joint_names,
+    link_names,
+    read_pr2,
+    weld_joints,
+)
+
+RIGHT = [FACTS["joints"][name] for name in joint_names()]
+
+
+def make_plant(
+    welds: dict[str, float] | None = None,
+) -> tuple[MultibodyPlant, SceneGraph, ModelInstanceIndex]:
+    plant, scene_graph = MultibodyPlant(time_step=1e-3), SceneGraph()
+    plant.RegisterAsSourceForSceneGraph(scene_graph)
+    pr2 = add_pr2(plant)
+    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("base_link_for_rbt_compat"))
+    weld_joints(plant, pr2, welds or {})
+    plant.Finalize()
+    return plant, scene_graph, pr2
+
+
+PLANT, SCENE_GRAPH, PR2 = make_plant()
+
+
+def or_infinite(values: list[float | None], sign: float) -> np.ndarray:
+    return np.array([sign * np.inf if value is None else value for value in values])
+
+
+def test_the_joints_of_both_arms_have_the_published_names_in_order() -> None:
+    assert list(joint_names()) == FACTS["chain"][1:]
+    assert [body["frame"] for body in BODIES] == list(link_names())
+    assert all(PLANT.HasJointNamed(name) for name in FACTS["joints"])
+
+
+@pytest.mark.parametrize("name", FACTS["joints"])
+def test_every_joint_has_the_published_limits_and_damping(name: str) -> None:
+    joint, facts = PLANT.GetJointByName(name), FACTS["joints"][name]
+    lower, upper = or_infinite([facts["lower"]], -1.0), or_infinite([facts["upper"]], 1.0)
+    np.testing.assert_array_equal(joint.position_lower_limits(), lower)
+    np.testing.assert_array_equal(joint.position_upper_limits(), upper)
+    velocity = or_infinite([facts["velocity_limit"]], 1.0)
+    np.testing.assert_array_equal(joint.velocity_upper_limits(), velocity)
+    np.testing.assert_array_equal(joint.default_damping_vector(), [facts["damping"]])
+
+
+@pytest.mark.parametrize("name", FACTS["joints"])
+def test_every_joint_lies_where_the_published_numbers_say(name: str) -> None:
+    joint, facts = PLANT.GetJointByName(name), FACTS["joints"][name]
+    context = PLANT.CreateDefaultContext()
+    parent = PLANT.GetFrameByName(facts["parent"], PR2)
+    X_PJ = joint.frame_on_parent().CalcPose(context, parent)
+    expected = RigidTransform(RollPitchYaw(facts["rpy_rad"]), facts["xyz_m"])
+    assert X_PJ.IsNearlyEqualTo(expected, 1e-12)
+    axis = joint.translation_axis() if facts["type"] == "prismatic" else joint.revolute_axis()
+    np.testing.assert_array_equal(axis, facts["axis"])
+    X_JC = joint.frame_on_child().CalcPose(context, joint.child_body().body_frame())
+    assert X_JC.IsNearlyEqualTo(RigidTransform(), 1e-12)
+
+
+def test_the_arm_has_the_published_limits_and_efforts() -> None:
+    pr2 = read_pr2()
+    np.testing.assert_array_equal(pr2.q_min, or_infinite([j["lower"] for j in RIGHT], -1.0))
+    np.testing.assert_array_equal(pr2.q_max, or_infinite([j["upper"] for j in RIGHT], 1.0))
+    np.testing.assert_array_equal(pr2.effort_limit, [j["effort_limit"] for j in RIGHT])
+    np.testing.assert_array_equal(pr2.velocity_limit, [j["velocity_limit"] for j in RIGHT])
+    np.testing.assert_allclose(pr2.lengths, [0.1, 0.4, 0.321, 0.18], atol=1e-12)
+    np.testing.assert_allclose(pr2.p_FA, [-0.05, -0.188, 0.790675], atol=1e-12)
+
+
+def test_the_soft_limits_are_the_published_ones_within_the_hard_ones() -> None:
+    low, high = np.array(SOFT_LIMITS).T
+    np.testing.assert_allclose(low, or_infinite([j["soft_lower"] for j in RIGHT], -1.0))
+    np.testing.assert_allclose(high, or_infinite([j["soft_upper"] for j in RIGHT], 1.0))
+    torso = FACTS["joints"]["torso_lift_joint"]
+    assert TORSO_RANGE_M == (torso["soft_lower"], torso["soft_upper"])
+    left = [FACTS["joints"][name] for name in joint_names("l")]
+    rest = np.array(LEFT_ARM_AT_REST)
+    assert np.all(rest >= or_infinite([j["soft_lower"] for j in left], -1.0))
+    assert np.all(rest <= or_infinite([j["soft_upper"] for j in left], 1.0))
+
+
+def test_the_impedance_gains_are_those_of_the_simulated_controllers() -> None:
+    # pr2sim_arm_controllers of gt-ros-pkg/hrl (hrl_gazebo_plugin).
+    np.testing.assert_array_equal(read_pr2().stiffness, [90.0, 80.0, 20.0, 22.0, 20.0, 27.5, 20.0])
+    np.testing.assert_array_equal(read_pr2().damping, [10.0, 10.0, 2.0, 1.0, 1.0, 2.0, 2.0])
+    assert PLANT.num_actuators() == 7
+
+
+@pytest.mark.parametrize("name", FACTS["moving_bodies"])
+def test_every_body_has_the_published_mass_and_inertia(name: str) -> None:
+    facts = FACTS["moving_bodies"][name]
+    body = PLANT.GetBodyByName("head" if name == "head" else facts["frame"])
+    assert body.default_mass() == pytest.approx(facts["mass_kg"], rel=1e-12)
+    np.testing.assert_allclose(body.default_com(), facts["com_m"], atol=1e-12)
+    about_com = body.default_spatial_inertia().Shift(body.default_com()).CalcRotationalInertia()
+    inertia = facts["inertia_kgm2"]
+    moments = [inertia[key] for key in ("ixx", "iyy", "izz")]
+    products = [inertia[key] for key in ("ixy", "ixz", "iyz")]
+    np.testing.assert_allclose(about_com.get_moments(), moments, atol=1e-9)
+    np.testing.assert_allclose(about_com.get_products(), products, atol=1e-9)
+
+
+def test_the_robot_weighs_what_the_published_one_does() -> None:
+    mass = PLANT.CalcTotalMass(PLANT.CreateDefaultContext())
+    assert mass == pytest.approx(FACTS["whole_robot_kg"], abs=1e-6)
+
+
+def body_names(moving_body: str) -> list[str]:
+    if moving_body in ("base", "torso"):
+        return [FACTS["moving_bodies"][moving_body]["frame"]]
+    return [f"{side}_{moving_body}_link" for side in "rl"]
+
+
+def shapes_of(body: str) -> list[tuple[object, ...]]:
+    """Sizes and poses of a body's collision shapes, to the micrometre, in any order."""
+    inspector, shapes = SCENE_GRAPH.model_inspector(), []
+    for geometry in PLANT.GetCollisionGeometriesForBody(PLANT.GetBodyByName(body)):
+        shape, X_LS = inspector.GetShape(geometry), inspector.GetPoseInFrame(geometry)
+        if isinstance(shape, Box):
+            size = shape.size().tolist()
+        else:
+            assert isinstance(shape, Cylinder)
+            size = [shape.radius(), shape.length()]
+        shapes.append(as_shape(size, X_LS))
+    return sorted(shapes)
+
+
+def as_shape(size: list[float], X_LS: RigidTransform) -> tuple[object, ...]:
+    matrix = np.round(X_LS.GetAsMatrix34(), 5) + 0.0
+    return (len(size), *np.round(size, 6).tolist(), *matrix.ravel().tolist())
+
+
+def test_the_collision_shapes_are_the_fitted_ones_on_both_arms_and_the_body() -> None:
+    expected: dict[str, list[tuple[object, ...]]] = {}
+    for entry in FACTS["collision"]:
+        for primitive in entry["primitives"]:
+            X_LS = RigidTransform(RollPitchYaw(primitive["rpy_rad"]), primitive["xyz_m"])
+            size = primitive.get("size_m") or [primitive["radius_m"], primitive["length_m"]]
+            for name in body_names(entry["body"]):
+                expected.setdefault(name, []).append(as_shape(size, X_LS))
+    found = {name: shapes_of(name) for name in expected}
+    # The model keeps the shapes of the head, which the facts count to the torso, on its own link.
+    found["torso_lift_link"] = sorted(found["torso_lift_link"] + shapes_of("head"))
+    assert found == {name: sorted(shapes) for name, shapes in expected.items()}
+    assert len(read_pr2().surface) == sum(len(expected[name]) for name in link_names())
+
+
+def test_pairs_that_touch_by_design_and_neighbours_are_filtered() -> None:
+    inspector = SCENE_GRAPH.model_inspector()
+    candidates = {
+        frozenset(PLANT.GetBodyFromFrameId(inspector.GetFrameId(g)).name() for g in pair)
+        for pair in inspector.GetCollisionCandidates()
+    }
+    for side in "rl":
+        names = {
+            name: f"{side}_{name}_link" for pair in FACTS["filtered_pairs"] for name in pair
+        } | {"torso": "torso_lift_link", "base": "base_link"}
+        for one, other in FACTS["filtered_pairs"]:
+            assert frozenset((names[one], names[other])) not in candidates
+        chain = ["torso_lift_link", *link_names(side)]
+        for one, other in pairwise(chain):
+            assert frozenset((one, other)) not in candidates
+        assert frozenset(("base_link", f"{side}_wrist_roll_link")) in candidates
+    assert frozenset(("r_forearm_roll_link", "r_shoulder_pan_link")) in candidates
+
+
+def test_the_frames_of_rigid_links_keep_their_published_names() -> None:
+    context = PLANT.CreateDefaultContext()
+    for side in "rl":
+        for frame, body in (("upper_arm", "upper_arm_roll"), ("forearm", "forearm_roll")):
+            X_BL = PLANT.GetFrameByName(f"{side}_{frame}_link").CalcPose(
+                context, PLANT.GetFrameByName(f"{side}_{body}_link")
+            )
+            assert X_BL.IsNearlyEqualTo(RigidTransform(), 0.0)
+        tool, palm = (
+            PLANT.GetFrameByName(f"{side}_gripper_{name}") for name in ("tool_frame", "palm_link")
+        )
+        X_PE = tool.CalcPose(context, palm)
+        expected = RigidTransform(
+            RollPitchYaw(FACTS["tool_frame"]["rpy_rad"]), FACTS["tool_frame"]["xyz_m"]
+        )
+        assert X_PE.IsNearlyEqualTo(expected, 1e-12)
+
+
+def test_welds_stand_where_the_joints_would_have() -> None:
+    positions = {"x": 0.4, "y": -0.3, "theta": 2.0, "torso_lift_joint": 0.2}
+    positions |= dict(zip(joint_names("l"), LEFT_ARM_AT_REST, strict=True))
+    welded, _, _ = make_plant(positions)
+    assert welded.num_positions() == 7
+    context, fixed = PLANT.CreateDefaultContext(), welded.CreateDefaultContext()
+    q = np.zeros(PLANT.num_positions())
+    for name, position in positions.items():
+        q[PLANT.GetJointByName(name).position_start()] = position
+    PLANT.SetPositions(context, q)
+    for name in ("base_link", "torso_lift_link", "l_wrist_roll_link", "r_gripper_tool_frame"):
+        X_WF = PLANT.GetFrameByName(name).CalcPoseInWorld(context)
+        assert welded.GetFrameByName(name).CalcPoseInWorld(fixed).IsNearlyEqualTo(X_WF, 1e-12)
+
+
+def test_the_model_is_read_without_a_warning(caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.WARNING):
+        make_plant()
+    assert not caplog.records

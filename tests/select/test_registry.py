@@ -1,0 +1,92 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fake_reach import fill_library
+from starts import ARM, LINE
+
+from lic_drake.errors import RequestError
+from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.select.baselines import CostSelector, RandomSelector
+from lic_drake.select.lic import LicSelector
+from lic_drake.select.registry import (
+    FallbackSelector,
+    Selector,
+    check_method,
+    make_selector,
+    method_names,
+    needs_library,
+)
+from lic_drake.select.situation import FailedReach, Situation
+
+GOAL = np.array([0.6, 0.1, 0.0])
+
+
+@pytest.fixture(scope="module")
+def columns(tmp_path_factory: pytest.TempPathFactory) -> dict[str, np.ndarray]:
+    path: Path = tmp_path_factory.mktemp("library")
+    return ExperienceLibrary(fill_library(path)).columns()
+
+
+@pytest.mark.parametrize("method", [*method_names(), "gp>cost", "rnd>rnd", "knn1>gp"])
+def test_a_known_strategy_is_accepted_and_named_in_its_selections(
+    method: str, columns: dict[str, np.ndarray]
+) -> None:
+    check_method(method)
+    assert needs_library(method) == (method not in ("rnd", "cost", "rnd>rnd"))
+    selector = make_selector(method, ARM, columns)
+    assert selector.method == method
+
+
+@pytest.mark.parametrize("method", ["svm", "", "gp2", ">", "gp>", ">cost", "gp>cost>rnd", "GP"])
+def test_an_unknown_strategy_is_refused_with_the_known_ones(method: str) -> None:
+    with pytest.raises(RequestError, match="choose one of rnd, cost, gp, .* as in gp>cost") as e:
+        check_method(method)
+    assert f"unknown method {method!r}" in str(e.value)
+    for use in (needs_library, lambda name: make_selector(name, ARM, {})):
+        with pytest.raises(RequestError, match="unknown method"):
+            use(method)
+
+
+@pytest.mark.parametrize("method", ["gp", "knn1", "rnd>gp"])
+def test_what_learns_needs_a_library(method: str) -> None:
+    with pytest.raises(RequestError, match="needs an experience library to learn from"):
+        make_selector(method, ARM)
+
+
+def test_only_the_plain_name_has_lic2(columns: dict[str, np.ndarray]) -> None:
+    both, first = make_selector("knn", ARM, columns), make_selector("knn1", ARM, columns)
+    assert isinstance(both, LicSelector) and isinstance(first, LicSelector)
+    assert first.second is None
+    assert both.second is not None
+    assert both.second.features.observed == (
+        *("first_start_y", "first_start_phi"),
+        *("first_final_x", "first_final_y"),
+    )
+    situation = Situation(p_WG=GOAL, starts=LINE)
+    np.testing.assert_array_equal(both.select(situation).x0, first.select(situation).x0)
+
+
+def test_one_strategy_for_the_first_attempt_and_another_for_all_later_ones() -> None:
+    asked: list[tuple[str, int]] = []
+
+    class Noting(RandomSelector):
+        def select(self, situation: Situation):  # type: ignore[no-untyped-def]
+            asked.append((self.method, len(situation.failed)))
+            return super().select(situation)
+
+    def noting(name: str) -> Selector:
+        return Noting(rng=np.random.default_rng(0), method=name)
+
+    selector = FallbackSelector(first=noting("a"), later=noting("b"), method="a>b")
+    failed = tuple(FailedReach.from_start(x0) for x0 in LINE.grid.x0[:2])
+    for n in (0, 1, 2):
+        selector.select(Situation(p_WG=GOAL, starts=LINE, failed=failed[:n]))
+    assert asked == [("a", 0), ("b", 1), ("b", 2)]
+
+
+def test_the_parts_of_a_combination_are_the_strategies_of_their_names() -> None:
+    selector = make_selector("rnd>cost", ARM)
+    assert isinstance(selector, FallbackSelector)
+    assert isinstance(selector.first, RandomSelector)
+    assert isinstance(selector.later, CostSelector)
