@@ -92,7 +92,7 @@ class Pr2Arm:
         )
         self.reach_m = self.kinematics.reach_m
         # Sensor, controller and stop rules ask for the same configuration, one after the other.
-        self._pose = lru_cache(maxsize=1)(lambda *q: self.kinematics.calc_pose(list(q)))
+        self._pose = lru_cache(maxsize=1)(self.kinematics.calc_pose)
 
     def add_to_plant(
         self, plant: MultibodyPlant, parent: Frame | None = None, mobile: bool = False

@@ -161,7 +161,8 @@ def _read_surface(plant: MultibodyPlant, scene_graph: SceneGraph, link: str) -> 
     shapes = []
     for geometry in plant.GetCollisionGeometriesForBody(plant.GetBodyByName(link)):
         shape, X_LS = inspector.GetShape(geometry), inspector.GetPoseInFrame(geometry)
-        R_LS, p_LS = X_LS.rotation().matrix(), X_LS.translation()
+        # Copies: what a plant has returned may keep it alive.
+        R_LS, p_LS = np.array(X_LS.rotation().matrix()), np.array(X_LS.translation())
         if isinstance(shape, Box):
             size = tuple(shape.size().tolist())
             shapes.append(SkinShape(link=link, kind="box", size=size, R_LS=R_LS, p_LS=p_LS))

@@ -50,7 +50,7 @@ def solve_pose(
     """
     q = solve_pointing(kinematics, p_RE, R_RE[:, 0], pan)
     for row in q:
-        R_R6 = kinematics.calc_pose(row.tolist()).R_RL[5]
+        R_R6 = kinematics.calc_pose(*row.tolist()).R_RL[5]
         y_6 = R_R6.T @ R_RE[:, 1]
         row[6] = _wrap(np.arctan2(y_6[2], y_6[1]))
     return _keep_limits(kinematics, q)
@@ -119,7 +119,7 @@ def calc_preselection_cost(
     """
     if not len(q):
         return np.zeros(0)
-    poses = [kinematics.calc_pose(row.tolist()) for row in q]
+    poses = [kinematics.calc_pose(*row.tolist()) for row in q]
     p_RE = np.array([pose.p_RE for pose in poses])
     depth = np.array([pose.p_RL[[5, 3]] for pose in poses]) - p_RE[:, None]
     wrist, elbow = np.abs(depth @ x_R).T

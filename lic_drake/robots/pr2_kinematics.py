@@ -81,7 +81,7 @@ class Pr2Kinematics:
         """Tells whether q keeps all joint limits, to a tolerance in radians."""
         return bool(np.all(q >= self.q_min - tolerance) and np.all(q <= self.q_max + tolerance))
 
-    def calc_pose(self, q: list[float]) -> Pr2Pose:
+    def calc_pose(self, *q: float) -> Pr2Pose:
         """Returns the arm's pose at seven joint angles, radians.
 
         Scalars, because numpy takes longer to start than these few numbers need.

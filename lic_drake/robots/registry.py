@@ -5,6 +5,7 @@ from collections.abc import Callable
 from lic_drake.errors import ScenarioError
 from lic_drake.robots.arm import Arm
 from lic_drake.robots.planar import planar_arm
+from lic_drake.robots.pr2 import pr2_arm
 
 _ROBOTS: dict[str, Callable[[], Arm]] = {}
 
@@ -26,3 +27,4 @@ def get_robot(name: str) -> Arm:
 
 
 register_robot("planar-arm", planar_arm)
+register_robot("pr2", pr2_arm)

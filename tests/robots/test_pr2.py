@@ -14,7 +14,7 @@ from pydrake.multibody.plant import (
     MultibodyPlant,
 )
 from pydrake.multibody.tree import FixedOffsetFrame
-from pydrake.systems.analysis import Simulator
+from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from lic_drake.errors import ScenarioError
@@ -22,6 +22,7 @@ from lic_drake.robots.arm import Arm
 from lic_drake.robots.pr2 import Pr2Arm, pr2_arm
 from lic_drake.robots.pr2_description import LEFT_ARM_AT_REST, joint_names, read_pr2
 from lic_drake.robots.pr2_inverse import calc_preselection_cost, solve_pose
+from lic_drake.robots.registry import get_robot
 
 STAND = ((0.3, -0.2, 0.5), 0.15)
 ARM = Pr2Arm(*STAND)
@@ -68,7 +69,13 @@ class World:
             self.context, self.pr2, np.concatenate([q, np.zeros(7)])
         )
         self.root.SetTime(0.0)
-        Simulator(self.diagram, self.root).AdvanceTo(seconds)
+        simulator = Simulator(self.diagram, self.root)
+        if self.plant.time_step() == 0.0:
+            ApplySimulatorConfig(
+                SimulatorConfig(integration_scheme="cenic", accuracy=1e-4, max_step_size=0.01),
+                simulator,
+            )
+        simulator.AdvanceTo(seconds)
 
     def positions(self) -> np.ndarray:
         return np.array(self.plant.GetPositions(self.context, self.pr2))
@@ -79,7 +86,7 @@ WORLD = World(ARM)
 
 def test_the_arm_is_an_arm_as_the_other_rooms_want_it() -> None:
     arm: Arm = pr2_arm()
-    assert pr2_arm() is arm
+    assert get_robot("pr2") is pr2_arm() is arm
     assert arm.name == "pr2"
     assert arm.link_names[0] == "r_shoulder_pan_link"
     assert arm.link_names[-1] == "r_wrist_roll_link"
@@ -230,10 +237,12 @@ def test_only_forearm_and_hand_ever_touch_the_rest_of_the_robot() -> None:
     assert 100.0 * num_touching / count == pytest.approx(FACTS["self_collision_pct"], abs=4.0)
 
 
-def test_the_arm_yields_to_a_push_like_springs_of_its_stiffness() -> None:
+@pytest.mark.parametrize("time_step", [0.0, 5e-3])
+def test_the_arm_yields_to_a_push_like_springs_of_its_stiffness(time_step: float) -> None:
+    world = World(ARM, time_step)
     for f_E_W in 3.0 * np.eye(3):
-        WORLD.settle(ARM.q_home, ARM.q_home, f_E_W, seconds=4.0)
-        q = WORLD.positions()
+        world.settle(ARM.q_home, ARM.q_home, f_E_W, seconds=4.0)
+        q = world.positions()
         torque = ARM.tip_jacobian(q).T @ f_E_W
         assert np.max(np.abs(torque)) > 0.2
         np.testing.assert_allclose(ARM.stiffness * (q - ARM.q_home), torque, atol=2e-3)

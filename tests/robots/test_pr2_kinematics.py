@@ -20,7 +20,7 @@ Stand = tuple[tuple[float, float, float], float]
 def test_links_and_tool_are_where_the_published_numbers_put_them(
     stand: Stand, angles: tuple[float, ...]
 ) -> None:
-    pose = Pr2Arm(*stand).kinematics.calc_pose(list(angles))
+    pose = Pr2Arm(*stand).kinematics.calc_pose(*angles)
     expected = link_poses(*stand, np.array(angles))
     np.testing.assert_allclose(pose.R_RL, expected[:7, :3, :3], atol=1e-12)
     np.testing.assert_allclose(pose.p_RL, expected[:7, :3, 3], atol=1e-12)
@@ -31,7 +31,7 @@ def test_links_and_tool_are_where_the_published_numbers_put_them(
 def test_the_tools_jacobians_are_those_of_the_published_numbers(
     stand: Stand, angles: tuple[float, ...]
 ) -> None:
-    pose = Pr2Arm(*stand).kinematics.calc_pose(list(angles))
+    pose = Pr2Arm(*stand).kinematics.calc_pose(*angles)
     p_RE = link_poses(*stand, np.array(angles))[7, :3, 3]
     expected = point_jacobian(*stand, np.array(angles), 6, p_RE)
     np.testing.assert_allclose(pose.Jw_E, expected[:3], atol=1e-12)
@@ -52,7 +52,7 @@ def test_point_jacobians_are_those_of_the_published_numbers(
     p_RQ = np.array(
         [poses[link, :3, :3] @ p_LQ + poses[link, :3, 3] for link, *p_LQ in points]
     ).reshape(-1, 3)
-    jacobians = calc_point_jacobians(Pr2Arm(*stand).kinematics.calc_pose(list(angles)), links, p_RQ)
+    jacobians = calc_point_jacobians(Pr2Arm(*stand).kinematics.calc_pose(*angles), links, p_RQ)
     assert jacobians.shape == (len(points), 3, 7)
     for jacobian, link, p in zip(jacobians, links, p_RQ, strict=True):
         expected = point_jacobian(*stand, q, link, p)[3:]
@@ -78,7 +78,7 @@ def test_a_whole_turn_of_a_continuous_joint_changes_nothing(
     q = np.array(angles)
     turned = q.copy()
     turned[joint] += half_turns * np.pi
-    before, after = ARM.kinematics.calc_pose(q.tolist()), ARM.kinematics.calc_pose(turned.tolist())
+    before, after = ARM.kinematics.calc_pose(*q), ARM.kinematics.calc_pose(*turned)
     for one, other in zip(before, after, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-12)
 
@@ -119,6 +119,6 @@ def test_answers_do_not_depend_on_what_was_asked_before(
 
 
 def test_shared_answers_cannot_be_written_to() -> None:
-    for answer in ARM.kinematics.calc_pose(ARM.q_home.tolist()):
+    for answer in ARM.kinematics.calc_pose(*ARM.q_home):
         with pytest.raises(ValueError, match="read-only"):
             answer[0] = 1.0
