@@ -65,9 +65,11 @@ def run(args: argparse.Namespace) -> int:
     library = ExperienceLibrary(args.library or shipped_library("cylinder-clutter"))
     scenario = library.scenario()
     p_WG = np.array([*args.goal, 0.0])
-    check_goal(scenario, p_WG)
     arm = planar_arm_of(scenario)
     starts = make_starts(scenario, scenario.sample_instance("evaluation", args.seed))
+    bases = starts.grid.p_WR
+    nearest = bases[np.argmin(np.linalg.norm(bases - p_WG[:2], axis=1))]
+    check_goal(scenario, p_WG - [*nearest, 0.0])
     failed = tuple(
         FailedReach.from_start(np.array([scenario.task.start_line.x_m, y, np.deg2rad(phi)]))
         for y, phi in args.failed
@@ -82,6 +84,7 @@ def run(args: argparse.Namespace) -> int:
                 {
                     "method": chosen.method,
                     "start": chosen.x0.tolist(),
+                    "base": chosen.p_WR.tolist(),
                     "joint_angles": chosen.q.tolist(),
                     "estimated_success": chosen.probability,
                     "seconds": chosen.seconds,
@@ -94,9 +97,10 @@ def run(args: argparse.Namespace) -> int:
         if chosen.probability is None
         else f", estimated success {100 * chosen.probability:.1f} %"
     )
+    base = "" if scenario.task.base is None else f", base at y {chosen.p_WR[1]:+.3f} m"
     print(
         f"{chosen.method}: start at y {chosen.x0[1]:+.3f} m, phi"
-        f" {np.rad2deg(chosen.x0[2]):+.1f} degrees{estimate}; joint angles"
+        f" {np.rad2deg(chosen.x0[2]):+.1f} degrees{base}{estimate}; joint angles"
         f" {np.round(np.rad2deg(chosen.q), 1).tolist()} degrees; {chosen.seconds:.2f} s"
     )
     return 0

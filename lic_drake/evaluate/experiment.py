@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lic_drake.errors import LicError
+from lic_drake.errors import LibraryError, LicError
 from lic_drake.evaluate.trial import Attempt, planar_arm_of, run_trial
 from lic_drake.evaluate.trials import TrialRow, read_trials, write_trials
 from lic_drake.experience.real_pairs import pair_real_attempts
@@ -101,6 +101,11 @@ def run_evaluation(
     planar_arm_of(scenario)
     library = evaluation.reaches
     library.create()
+    if library.shard_paths() and library.header().scenario_digest != scenario.digest:
+        raise LibraryError(
+            f"{library.path} holds reaches of another scenario than {evaluation.experience};"
+            " choose another folder for the results"
+        )
     blocks = _blocks(evaluation)
     # Threads of linear algebra in this process would be inherited by nobody and help nobody.
     executor = ProcessPoolExecutor(

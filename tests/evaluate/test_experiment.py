@@ -1,34 +1,27 @@
+from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import replace
-from math import comb, isnan
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from fake_reach import make_record, make_request
+from fake_reach import comparable, make_record, make_request
 
-from lic_drake.errors import RequestError
+from lic_drake.errors import LibraryError, RequestError
 from lic_drake.evaluate import experiment as dut
-from lic_drake.evaluate.experiment import Trial, format_rates, mcnemar, summarize_trials
+from lic_drake.evaluate.experiment import Evaluation, run_evaluation
+from lic_drake.evaluate.trials import TrialRow, read_trials
 from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.reach.scenario import Scenario, load_scenario
+from lic_drake.reach.request import ReachRecord, ReachRequest, request_of
+from lic_drake.reach.scenario import load_scenario
 
-EASY = "{clutter: {num_movable: 0, num_fixed: 2}, stop: {timeout_s: 3}}"
-
-
-def _fake_trial(method: str, environment: int, *outcomes: bool) -> Trial:
-    (request, *_) = make_request().reaches(0)
-    record = make_record(request)
-    return Trial(
-        method=method,
-        environment=environment,
-        goal=0,
-        selections=(),
-        records=tuple(replace(record, success=outcome) for outcome in outcomes),
-    )
+EASY = "{clutter: {num_movable: 2, num_fixed: 2}, stop: {timeout_s: 0.2}}"
 
 
-def _library(path: Path, scenario: Scenario) -> ExperienceLibrary:
+def make_library(path: Path, category: str = "cylinder-clutter") -> ExperienceLibrary:
     """A library in which every start left of the middle succeeds, and no other."""
+    scenario = load_scenario(category, EASY)
     library = ExperienceLibrary(path)
     request = make_request(scenario=scenario, max_goals=6, max_starts=9)
     for environment in range(3):
@@ -39,68 +32,277 @@ def _library(path: Path, scenario: Scenario) -> ExperienceLibrary:
     return library
 
 
-def test_mcnemar_is_the_sign_test_of_the_goals_that_only_one_strategy_reached() -> None:
-    a = np.array([True] * 9 + [False] * 2 + [True] * 20 + [False] * 5)
-    b = np.array([False] * 9 + [True] * 2 + [True] * 20 + [False] * 5)
-    exact = 2 * sum(comb(11, k) for k in range(3)) / 2**11
-    assert mcnemar(a, b) == pytest.approx(exact)
-    assert mcnemar(b, a) == pytest.approx(exact)
-    assert mcnemar(a, a) == 1.0
+class HereExecutor:
+    """Does in this process, at once, what it is given."""
+
+    def __init__(
+        self, workers: int, *, mp_context: Any, initializer: Callable[..., None], initargs: Any
+    ) -> None:
+        initializer(*initargs)
+
+    def submit(self, function: Callable[..., Any], *args: Any) -> "Future[Any]":
+        future: Future[Any] = Future()
+        try:
+            future.set_result(function(*args))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+    def shutdown(self, cancel_futures: bool) -> None:
+        pass
 
 
-def test_rates_count_successes_within_the_first_attempts() -> None:
-    trials = [
-        _fake_trial("rnd", 0, False, True),
-        _fake_trial("rnd", 1, False, False),
-        _fake_trial("gp", 0, True),
-        _fake_trial("gp", 1, False, True),
-    ]
-    counts = {(r.method, r.attempts): r.successes for r in summarize_trials(trials, 2)}
-    assert counts == {("rnd", 1): 0, ("gp", 1): 1, ("rnd", 2): 1, ("gp", 2): 2}
-    p_values = {r.method: r.p_value for r in summarize_trials(trials, 1)}
-    assert isnan(p_values["rnd"])
-    assert p_values["gp"] == 1.0
-    table = format_rates(summarize_trials(trials, 1)).splitlines()
-    assert len(table) == 4
-    assert table[3].startswith("| gp | 1 | 50.0 |")
+@pytest.fixture
+def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Keys of the reaches simulated, which are made-up ones in this process."""
+    keys: list[str] = []
+
+    def reach(request: ReachRequest) -> ReachRecord:
+        keys.append(request.key)
+        return make_record(request)
+
+    monkeypatch.setattr(dut, "run_reach", reach)
+    monkeypatch.setattr(dut, "ProcessPoolExecutor", HereExecutor)
+    monkeypatch.setattr(dut, "prepare_worker", lambda: None)
+    monkeypatch.setattr(dut, "_worker", None)
+    return keys
 
 
-def test_trials_share_goals_learn_from_the_library_and_resume(tmp_path: Path) -> None:
-    scenario = load_scenario("cylinder-clutter", EASY)
-    library = _library(tmp_path / "library", scenario)
+def evaluation(tmp_path: Path, **values: Any) -> Evaluation:
+    if not (tmp_path / "library").exists():
+        make_library(tmp_path / "library")
+    defaults: dict[str, Any] = {
+        "experience": tmp_path / "library",
+        "results": tmp_path / "out",
+        "methods": ("rnd", "knn"),
+        "environments": 3,
+        "goals": 2,
+    }
+    return Evaluation(**{**defaults, **values})
+
+
+def without_times(rows: list[TrialRow]) -> list[str]:
+    return [repr(replace(row, seconds=0.0)) for row in rows]
+
+
+def records_of(evaluation: Evaluation) -> dict[str, ReachRecord]:
+    return {record.key: record for record in evaluation.reaches.records()}
+
+
+def quiet(_: str) -> None:
+    pass
+
+
+def test_strategies_are_tried_at_the_same_goals_of_the_same_environments(
+    tmp_path: Path, calls: list[str]
+) -> None:
+    asked = evaluation(tmp_path, first_environment=7)
+    lines: list[str] = []
+    rows = run_evaluation(asked, say=lines.append)
+    records = records_of(asked)
+    scenario = asked.reaches.scenario()
+    firsts = [row for row in rows if row.attempt == 1]
+    tried = {
+        method: [(row.environment, row.goal) for row in firsts if row.method == method]
+        for method in asked.methods
+    }
+    assert tried["rnd"] == tried["knn"] == [(e, g) for e in (7, 8, 9) for g in (0, 1)]
+    for row in rows:
+        record = records[row.key]
+        assert (record.stream, record.environment) == ("evaluation", row.environment)
+        expected = scenario.sample_goal("evaluation", row.environment, row.goal)
+        np.testing.assert_array_equal(record.p_WG, expected)
+    # What was learned from the library: starts left of the middle.
+    assert all(records[row.key].start_y > 0.0 for row in firsts if row.method == "knn")
+    assert any(records[row.key].start_y < 0.0 for row in firsts if row.method == "rnd")
+    assert lines[-1].startswith(f"  1/1 blocks, {len(rows)} attempts, knn ")
+
+
+def test_rows_agree_with_the_library_of_reaches(tmp_path: Path, calls: list[str]) -> None:
+    asked = evaluation(tmp_path, attempts=3)
+    rows = run_evaluation(asked, say=quiet)
+    records, scenario = records_of(asked), asked.reaches.scenario()
+    assert len(calls) == len(set(calls)) == len(records)
+    assert set(records) == {row.key for row in rows} == set(calls)
+    trials: dict[tuple[str, int, int], list[TrialRow]] = {}
+    for row in rows:
+        assert row.success == records[row.key].success
+        assert np.isnan(row.probability) == (row.method == "rnd")
+        trials.setdefault((row.method, row.environment, row.goal), []).append(row)
+    assert any(len(trial) == 3 for trial in trials.values())
+    for trial in trials.values():
+        assert [row.attempt for row in trial] == list(range(1, len(trial) + 1))
+        assert not any(row.success for row in trial[:-1])
+        assert trial[-1].success or len(trial) == 3
+        # Each found the environment as those before it left it.
+        chain = [request_of(records[row.key], scenario) for row in trial]
+        for number, request in enumerate(chain):
+            assert len(request.after) == number
+            assert request.before() == (chain[number - 1] if number else None)
+
+
+def test_fresh_attempts_find_the_environment_as_it_was_drawn(
+    tmp_path: Path, calls: list[str]
+) -> None:
+    asked = evaluation(tmp_path, fresh=True, variant="fresh")
+    rows = run_evaluation(asked, say=quiet)
+    assert any(row.attempt == 2 for row in rows)
+    assert all(record.after == () for record in asked.reaches.records())
+    assert {row.variant for row in rows} == {"fresh"}
+
+
+def test_run_again_it_simulates_nothing_and_gives_the_same_rows(
+    tmp_path: Path, calls: list[str]
+) -> None:
+    asked = evaluation(tmp_path)
+    rows = run_evaluation(asked, say=quiet)
+    content = comparable(asked.reaches.records())
+    calls.clear()
+    assert without_times(run_evaluation(asked, say=quiet)) == without_times(rows)
+    assert calls == []
+    assert comparable(asked.reaches.records()) == content
+    assert without_times(read_trials(asked.trials_path)) == without_times(rows)
+
+
+def test_an_interrupted_evaluation_simulates_nothing_twice(
+    tmp_path: Path, calls: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(dut, "REACHES_A_BLOCK", 1)
+    asked = evaluation(tmp_path, environments=5)
+    expected = without_times(run_evaluation(replace(asked, results=tmp_path / "whole"), say=quiet))
+    calls.clear()
     lines: list[str] = []
 
-    def run() -> list[Trial]:
-        lines.clear()
-        return dut.run_trials(
-            scenario, library, tmp_path / "out", ["rnd", "knn"], 2, 1, say=lines.append
-        )
+    def interrupt(line: str) -> None:
+        lines.append(line)
+        if len(lines) == 2:
+            raise KeyboardInterrupt
 
-    first = run()
-    assert [(t.method, t.environment) for t in first] == [
-        ("rnd", 0),
-        ("rnd", 1),
-        ("knn", 0),
-        ("knn", 1),
-    ]
-    assert [t.records[0].p_WG.tolist() for t in first[:2]] == [
-        t.records[0].p_WG.tolist() for t in first[2:]
-    ]
-    assert all(t.records[0].stream == "evaluation" for t in first)
-    assert all(t.selections[0].x0[1] > 0.0 for t in first[2:])
-    assert any("4/4 reaches" in line for line in lines)
-
-    again = run()
-    # Wall times would differ if anything had been simulated again.
-    assert [(t.records[0].key, t.records[0].wall_time_s) for t in again] == [
-        (t.records[0].key, t.records[0].wall_time_s) for t in first
-    ]
-    assert not any("reaches," in line for line in lines)
+    with pytest.raises(KeyboardInterrupt):
+        run_evaluation(asked, say=interrupt)
+    kept = asked.reaches.keys()
+    assert kept and kept < set(calls)
+    assert not asked.trials_path.exists()
+    calls.clear()
+    assert without_times(run_evaluation(asked, say=quiet)) == expected
+    assert not kept & set(calls)
+    assert len(calls) == len(set(calls))
+    assert kept | set(calls) == asked.reaches.keys()
+    assert [path.name for path in asked.reaches.shard_paths()] == ["reaches.parquet"]
 
 
-def test_unknown_method_is_refused_before_any_reach(tmp_path: Path) -> None:
-    scenario = load_scenario("cylinder-clutter", EASY)
-    library = _library(tmp_path / "library", scenario)
+def test_more_goals_environments_or_attempts_keep_what_was_simulated(
+    tmp_path: Path, calls: list[str]
+) -> None:
+    small = evaluation(tmp_path, environments=2, goals=1, attempts=1)
+    first = run_evaluation(small, say=quiet)
+    large = replace(small, environments=3, goals=2, attempts=2)
+    calls.clear()
+    rows = run_evaluation(large, say=quiet)
+    assert not set(calls) & {row.key for row in first}
+    # Also RND's draws, which do not depend on how many others there are.
+    assert set(without_times(first)) <= set(without_times(rows))
+
+
+def test_the_file_keeps_the_trials_of_other_variants_and_strategies(
+    tmp_path: Path, calls: list[str]
+) -> None:
+    def file() -> list[tuple[str, str]]:
+        rows = read_trials(tmp_path / "out" / "trials.parquet")
+        return sorted({(row.variant, row.method) for row in rows})
+
+    plain = evaluation(tmp_path, methods=("rnd", "cost"))
+    rows = run_evaluation(plain, say=quiet)
+    fresh = run_evaluation(replace(plain, fresh=True, variant="fresh"), say=quiet)
+    more = run_evaluation(replace(plain, methods=("knn",)), say=quiet)
+    assert file() == [("", "cost"), ("", "knn"), ("", "rnd"), ("fresh", "cost"), ("fresh", "rnd")]
+    # Again with fewer environments: those trials replace the older ones of the same name.
+    fewer = run_evaluation(replace(plain, methods=("rnd",), environments=1), say=quiet)
+    assert file() == [("", "cost"), ("", "knn"), ("", "rnd"), ("fresh", "cost"), ("fresh", "rnd")]
+    expected = [*(row for row in rows if row.method == "cost"), *fresh, *more, *fewer]
+    stored = read_trials(tmp_path / "out" / "trials.parquet")
+    assert sorted(without_times(stored)) == sorted(without_times(expected))
+
+
+def test_one_strategy_may_follow_another(tmp_path: Path, calls: list[str]) -> None:
+    asked = evaluation(tmp_path, methods=("rnd", "cost", "rnd>cost"))
+    rows = run_evaluation(asked, say=quiet)
+    by = {(row.method, row.environment, row.goal, row.attempt): row for row in rows}
+    seconds = 0
+    for (method, environment, goal, attempt), row in by.items():
+        if method != "rnd>cost":
+            continue
+        if attempt == 1:
+            assert row.key == by["rnd", environment, goal, 1].key
+        else:
+            seconds += 1
+    assert seconds > 0
+
+
+def test_all_environments_may_share_the_goals_of_the_first(
+    tmp_path: Path, calls: list[str]
+) -> None:
+    asked = evaluation(tmp_path, common_goals=True, first_environment=4)
+    run_evaluation(asked, say=quiet)
+    scenario = asked.reaches.scenario()
+    expected = {tuple(scenario.sample_goal("evaluation", 4, goal)) for goal in (0, 1)}
+    assert {tuple(record.p_WG) for record in asked.reaches.records()} == expected
+
+
+def test_apertures_are_evaluated_with_bases(tmp_path: Path, calls: list[str]) -> None:
+    make_library(tmp_path / "library", "cylinder-aperture-clutter")
+    asked = evaluation(tmp_path, methods=("rnd", "cost", "gp"), goals=1)
+    rows = run_evaluation(asked, say=quiet)
+    scenario = asked.reaches.scenario()
+    assert len({record.base_y for record in asked.reaches.records()}) > 3
+    for record in asked.reaches.records():
+        p_WA = scenario.sample_instance("evaluation", record.environment).p_WA
+        assert p_WA is not None
+        assert np.linalg.norm(p_WA[:, :2] - record.x0[:2], axis=1).min() < 1e-9
+    assert {row.method for row in rows} == {"rnd", "cost", "gp"}
+
+
+def test_two_processes_give_the_rows_and_reaches_of_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(dut, "REACHES_A_BLOCK", 1)
+    results = []
+    for workers in (1, 2):
+        asked = evaluation(tmp_path, results=tmp_path / str(workers), goals=1)
+        rows = run_evaluation(asked, workers, quiet)
+        results.append((without_times(rows), comparable(asked.reaches.records())))
+    assert results[0] == results[1]
+    assert len(results[0][0]) > 6
+    # Simulated ones: none takes longer than it may.
+    assert max(record.duration_s for record in asked.reaches.records()) == pytest.approx(0.2)
+    again = {record.key: record.wall_time_s for record in asked.reaches.records()}
+    run_evaluation(asked, 2, quiet)
+    assert {r.key: r.wall_time_s for r in asked.reaches.records()} == again
+
+
+def test_unknown_method_is_refused_before_any_reach(tmp_path: Path, calls: list[str]) -> None:
     with pytest.raises(RequestError, match="unknown method 'svm'"):
-        dut.run_trials(scenario, library, tmp_path / "out", ["svm"], 1, 1)
+        run_evaluation(evaluation(tmp_path, methods=("rnd", "svm")))
     assert not (tmp_path / "out").exists()
+    assert calls == []
+
+
+def test_results_of_another_scenario_are_refused_before_any_reach(
+    tmp_path: Path, calls: list[str]
+) -> None:
+    run_evaluation(evaluation(tmp_path), say=quiet)
+    make_library(tmp_path / "other", "passage-clutter")
+    calls.clear()
+    with pytest.raises(LibraryError, match="holds reaches of another scenario"):
+        run_evaluation(evaluation(tmp_path, experience=tmp_path / "other", goals=1), say=quiet)
+    assert calls == []
+
+
+def test_what_is_wrong_in_a_worker_is_told_as_it_is(tmp_path: Path) -> None:
+    asked = evaluation(tmp_path)
+    (shard, *_) = ExperienceLibrary(tmp_path / "library").shard_paths()
+    content = bytearray(shard.read_bytes())
+    content[len(content) // 3] ^= 0xFF
+    shard.write_bytes(content)
+    with pytest.raises(LibraryError, match="is damaged or not a Parquet file"):
+        run_evaluation(asked, 1, quiet)

@@ -35,6 +35,32 @@ def test_the_papers_library_of_passages_has_1680_different_reaches() -> None:
         assert goal == tuple(scenario.sample_goal("training", environment).tolist())
 
 
+def test_the_papers_library_of_apertures_has_7200_different_reaches() -> None:
+    scenario = load_scenario("cylinder-aperture-clutter")
+    request = CollectionRequest(scenario=scenario, environments=480)
+    assert (len(request.goals()), len(request.starts().x0)) == (1, 15)
+    assert len(request.environment_indices) * 15 == 7200
+    reaches = [item for environment in range(0, 480, 40) for item in request.reaches(environment)]
+    assert len({item.key for item in reaches}) == len(reaches) == 12 * 15
+    # The same hand in the same aperture, but each time another direction and base.
+    assert len({item.base for item in reaches}) == len(reaches)
+    for environment in (0, 40):
+        apertures = scenario.sample_instance("training", environment).p_WA
+        assert apertures is not None
+        assert {item.start[:2] for item in reaches if item.environment == environment} == set(
+            map(tuple, apertures[:, :2].tolist())
+        )
+
+
+def test_starts_and_bases_belong_together_when_thinned() -> None:
+    scenario = load_scenario("cylinder-aperture-clutter")
+    whole = CollectionRequest(scenario=scenario).starts(2)
+    some = CollectionRequest(scenario=scenario, max_starts=4).starts(2)
+    rows = [np.flatnonzero((whole.x0 == x0).all(axis=1))[0] for x0 in some.x0]
+    assert len(rows) == 4
+    np.testing.assert_array_equal(some.p_WR, whole.p_WR[rows])
+
+
 def test_every_goal_is_tried_from_every_start() -> None:
     request = make_request(first_environment=5, stream="holdout")
     reaches = request.reaches(6)

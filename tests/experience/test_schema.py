@@ -4,6 +4,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
@@ -18,10 +19,13 @@ from lic_drake.experience.schema import (
     make_header,
     read_header,
     read_table,
+    schema_of,
     to_records,
     to_table,
     write_table,
 )
+from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.paths import shipped_library
 from lic_drake.reach.request import ReachRecord
 from lic_drake.reach.scenario import load_scenario, parse_scenario
 
@@ -172,8 +176,50 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
         read_table(tmp_path / "none.parquet")
 
 
+def _as_version_1(table: pa.Table) -> pa.Table:
+    """The table as it was before a base could move and reaches could follow each other."""
+    metadata = {**table.schema.metadata, b"lic_drake.schema_version": b"1"}
+    older = table.drop_columns(["base_x", "base_y", "after"])
+    return older.replace_schema_metadata(metadata)
+
+
+def test_a_table_of_version_1_is_read_with_a_base_at_the_origin_and_no_earlier_reach(
+    shard: Path,
+) -> None:
+    pq.write_table(_as_version_1(pq.read_table(shard)), shard)
+    assert read_header(shard).schema_version == 1
+    records = to_records(read_table(shard))
+    assert all((r.base_x, r.base_y, r.after) == (0.0, 0.0, ()) for r in records)
+    assert list(map(_bits, records)) == list(map(_bits, RECORDS))
+    assert read_table(shard).schema.equals(SCHEMA, check_metadata=False)
+    for columns in (["base_y"], ["after", "key", "base_x"], ["key"], []):
+        assert read_table(shard, columns).column_names == columns
+        assert len(read_table(shard, columns)) == (len(RECORDS))
+
+
+@pytest.mark.parametrize("name", ["cylinder-clutter", "passage-clutter"])
+def test_the_shipped_libraries_are_read_whatever_their_version(name: str) -> None:
+    library = ExperienceLibrary(shipped_library(name))
+    columns = library.columns()
+    assert list(columns) == SCHEMA.names
+    assert not np.any([columns["base_x"], columns["base_y"]])
+    assert all(len(after) == 0 for after in columns["after"])
+    assert set(columns["scenario"]) == {library.header().scenario_digest}
+
+
+def test_a_table_of_version_1_has_the_columns_of_version_1(shard: Path) -> None:
+    table = pq.read_table(shard)
+    metadata = {**table.schema.metadata, b"lic_drake.schema_version": b"1"}
+    pq.write_table(table.replace_schema_metadata(metadata), shard)
+    with pytest.raises(LibraryError, match=r"has other columns .* \(after, base_x, base_y\)"):
+        read_table(shard)
+
+
 def test_the_schema_keeps_its_version() -> None:
     # A change here means that older libraries cannot be read: raise SCHEMA_VERSION with it.
     columns = ",".join(f"{item.name}:{item.type}" for item in SCHEMA)
     assert columns.count(",") == 33
+    first = ",".join(f"{item.name}:{item.type}" for item in schema_of(1))
+    assert first.count(",") == 30
+    assert columns.startswith(f"{first},base_x:double,base_y:double,after:list<")
     assert columns.startswith("key:string,category:string,robot:string,scenario:string,stream")

@@ -11,7 +11,7 @@ from lic_drake.errors import LibraryError
 from lic_drake.experience.grid import REQUEST_FILE, write_request
 from lic_drake.experience.journal import Journal, journal_path
 from lic_drake.experience.lock import CollectionLock
-from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.experience.store import COMPACTED, ExperienceLibrary
 from lic_drake.reach.scenario import load_scenario
 
 REQUEST = make_request()
@@ -65,6 +65,70 @@ def test_a_single_file_is_a_library_too(library: ExperienceLibrary) -> None:
 def test_writing_a_shard_again_replaces_it(library: ExperienceLibrary) -> None:
     library.write_shard("training-1", RECORDS[2], SCENARIO)
     assert comparable(library.records()) == comparable(RECORDS[0] + RECORDS[2])
+
+
+def names(library: ExperienceLibrary) -> list[str]:
+    return sorted(path.name for path in library.path.iterdir())
+
+
+def test_compacting_makes_one_file_of_the_same_rows_and_is_safe_to_repeat(
+    library: ExperienceLibrary,
+) -> None:
+    write_request(REQUEST, library.path / REQUEST_FILE)
+    before = comparable(library.records())
+    library.compact()
+    assert names(library) == [REQUEST_FILE, f"{COMPACTED}.parquet"]
+    assert sorted(comparable(library.records())) == sorted(before)
+    content = library.shard_path(COMPACTED).read_bytes()
+    library.compact()
+    assert library.shard_path(COMPACTED).read_bytes() == content
+    # With new rows beside it, also such that are there already.
+    library.write_shard("new", [*RECORDS[2], RECORDS[0][3]], SCENARIO)
+    library.compact()
+    assert names(library) == [REQUEST_FILE, f"{COMPACTED}.parquet"]
+    expected = RECORDS[0] + RECORDS[1] + RECORDS[2]
+    assert sorted(comparable(library.records())) == sorted(comparable(expected))
+    assert library.scenario() == SCENARIO
+    # Rows of an environment stand together.
+    assert list(library.columns()["environment"]) == sorted(r.environment for r in expected)
+
+
+def test_a_kill_between_writing_and_deleting_loses_nothing(
+    library: ExperienceLibrary, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = comparable(library.records())
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "unlink", lambda path: (_ for _ in ()).throw(KeyboardInterrupt))
+        with pytest.raises(KeyboardInterrupt):
+            library.compact()
+    assert len(names(library)) == 3
+    library.compact()
+    assert names(library) == [f"{COMPACTED}.parquet"]
+    assert sorted(comparable(library.records())) == sorted(before)
+
+
+def test_compacting_leaves_alone_what_is_one_file_already(library: ExperienceLibrary) -> None:
+    single = ExperienceLibrary(library.path / "training-1.parquet")
+    before = names(library)
+    single.compact()
+    assert names(library) == before
+    library.shard_path("training-0").unlink()
+    library.compact()
+    assert names(library) == ["training-1.parquet"]
+    empty = ExperienceLibrary(library.path / "empty")
+    empty.create()
+    empty.compact()
+    assert names(empty) == []
+
+
+def test_libraries_of_two_scenarios_are_not_made_one(library: ExperienceLibrary) -> None:
+    other = load_scenario("cylinder-clutter", "{stop: {timeout_s: 20}}")
+    rows = [replace(record, scenario=other.digest) for record in RECORDS[2]]
+    library.write_shard("other", rows, other)
+    before = names(library)
+    with pytest.raises(LibraryError, match="hold different scenarios"):
+        library.compact()
+    assert names(library) == before
 
 
 def test_a_library_that_is_not_there_or_empty_says_how_to_make_one(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from lic_drake.reach.request import ReachRecord, ReachRequest, request_of
 from lic_drake.reach.rollout import run_reach
 
 SCENARIO = small_clutter(2.5)
-FIRST = reach_request(SCENARIO, (0.7, 0.0), 0.0, 90.0, environment=0)
+FIRST = reach_request(SCENARIO, (0.7, 0.0), 0.0, 90.0, environment=2)
 # The same start again; and one elsewhere, of another base.
 SECOND = FIRST.then(np.array(FIRST.start), np.zeros(2))
 THIRD = SECOND.then(np.array([0.335, 0.1, np.deg2rad(60.0)]), np.array([0.0, 0.1]))
@@ -63,7 +63,7 @@ def by_hand(requests: list[ReachRequest]) -> list[ReachRecord]:
 
 
 def test_the_first_of_these_reaches_pushes_something() -> None:
-    instance = SCENARIO.sample_instance("training", 0)
+    instance = SCENARIO.sample_instance("training", 2)
     result = dut.simulate_request(FIRST)
     moved = np.abs(result.trace.p_WO - instance.p_WO[instance.movable, :2]).max(axis=1)
     assert moved.max() > 1e-3
@@ -87,7 +87,7 @@ def test_a_second_reach_differs_from_one_that_finds_the_environment_as_drawn() -
 
 def test_a_second_reach_does_not_depend_on_what_ran_before_in_the_process() -> None:
     expected = [alone(request) for request in (SECOND, THIRD)]
-    other = reach_request(SCENARIO, (0.6, 0.1), environment=2)
+    other = reach_request(SCENARIO, (0.6, 0.1), environment=0)
     forget()
     for before in ([FIRST], [FIRST, SECOND], [other, THIRD, FIRST], [THIRD], [SECOND, other]):
         for request in before:
@@ -141,7 +141,7 @@ def test_only_a_few_environments_are_kept() -> None:
 @pytest.mark.parametrize("phi_deg", [-90.0, 90.0])
 def test_a_reach_that_never_began_leaves_everything_in_its_place(phi_deg: float) -> None:
     goal = (0.7, 0.0) if phi_deg < 0 else (5.0, 0.0)
-    nothing = reach_request(SCENARIO, goal, phi_deg=phi_deg)
+    nothing = reach_request(SCENARIO, goal, phi_deg=phi_deg, environment=2)
     assert_never_began(alone(nothing), "invalid_start" if phi_deg < 0 else "unreachable")
     after = nothing.then(np.array(FIRST.start), np.zeros(2))
     assert measured(alone(after)) == measured(alone(replace(after, after=())))

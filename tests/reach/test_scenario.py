@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from lic_drake.control.mpc_config import ijrr_2013
 from lic_drake.errors import LicError, ScenarioError
-from lic_drake.paths import scenarios_dir
+from lic_drake.paths import scenarios_dir, shipped_library
 from lic_drake.reach.scenario import Scenario, load_scenario, parse_scenario, to_dict
 from lic_drake.reach.task import BaseTrack
 
@@ -259,6 +259,56 @@ def test_the_digest_changes_with_every_value_by_as_little_as_one_bit(name: str) 
     assert len(digests) > 40
     assert len(set(digests)) == len(digests)
     assert scenario.digest == digests[0]
+
+
+@pytest.mark.parametrize("name", ["cylinder-clutter", "passage-clutter"])
+def test_fields_that_came_later_leave_the_digests_of_the_shipped_libraries_alone(
+    name: str,
+) -> None:
+    content = yaml.safe_load((shipped_library(name) / "_collection.yaml").read_text())
+    assert load_scenario(name).digest == content["scenario_digest"]
+    stored = parse_scenario(yaml.safe_dump(content["scenario"]))
+    assert stored == load_scenario(name)
+    assert stored.digest == content["scenario_digest"]
+
+
+def test_a_later_field_counts_as_soon_as_it_is_not_as_before() -> None:
+    digests = {
+        load_scenario("cylinder-clutter", overrides).digest
+        for overrides in (
+            "",
+            "{task: {goal_area: {random_goals: 0}}}",
+            "{task: {base: null}}",
+            "{task: {goal_area: {random_goals: 1}}}",
+        )
+    }
+    assert len(digests) == 2
+
+
+def test_a_base_that_moves_needs_apertures() -> None:
+    with pytest.raises(ScenarioError, match="a base that moves along a track needs apertures"):
+        load_scenario("cylinder-clutter", "{task: {base: {y_min_m: -0.1}}}")
+    scenario = load_scenario("cylinder-aperture-clutter")
+    assert scenario.task.base is not None
+    for values in ("{y_min_m: 1.0, y_max_m: 0.0}", "{starts_per_aperture: 0}", "{y_max_m: .nan}"):
+        with pytest.raises(ScenarioError, match="task: "):
+            load_scenario("cylinder-aperture-clutter", f"{{task: {{base: {values}}}}}")
+
+
+def test_random_goals_are_functions_of_the_environment_in_the_area() -> None:
+    scenario = load_scenario("cylinder-clutter", "{task: {goal_area: {random_goals: 4}}}")
+    goals = scenario.goals("training", 3)
+    assert goals.shape == (4, 3)
+    np.testing.assert_array_equal(goals, scenario.goals("training", 3))
+    np.testing.assert_array_equal(
+        goals, [scenario.sample_goal("training", 3, index) for index in range(4)]
+    )
+    area = scenario.task.goal_area
+    assert np.all(goals[:, :2] >= area.lower) and np.all(goals[:, :2] <= area.upper)
+    everything = np.vstack([goals, scenario.goals("training", 4), scenario.goals("holdout", 3)])
+    assert len(np.unique(everything, axis=0)) == 12
+    with pytest.raises(ScenarioError, match="random_goals must be 0 or more, got -1"):
+        load_scenario("cylinder-clutter", "{task: {goal_area: {random_goals: -1}}}")
 
 
 def test_the_digest_ignores_comments_order_and_how_numbers_are_written() -> None:

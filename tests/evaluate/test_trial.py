@@ -1,0 +1,110 @@
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+from fake_reach import make_record
+
+from lic_drake.errors import RequestError
+from lic_drake.evaluate.trial import planar_arm_of, run_trial
+from lic_drake.reach.request import ReachRecord, ReachRequest
+from lic_drake.reach.scenario import load_scenario
+from lic_drake.select.baselines import RandomSelector
+from lic_drake.select.situation import Selection, Situation
+
+GOAL = np.array([0.6, 0.1, 0.0])
+LINE = load_scenario("cylinder-clutter")
+APERTURES = load_scenario("cylinder-aperture-clutter")
+BOTH = pytest.mark.parametrize("scenario", [LINE, APERTURES], ids=["line", "apertures"])
+
+
+@dataclass
+class Watched:
+    """A random strategy that keeps what it was asked."""
+
+    method: str = "watched"
+    situations: list[Situation] = field(default_factory=list)
+    random: RandomSelector = field(
+        default_factory=lambda: RandomSelector(rng=np.random.default_rng(2))
+    )
+
+    def select(self, situation: Situation) -> Selection:
+        self.situations.append(situation)
+        return self.random.select(situation)
+
+
+def failing(request: ReachRequest) -> ReachRecord:
+    return replace(make_record(request), success=False)
+
+
+@BOTH
+def test_a_trial_ends_with_its_first_success_or_its_last_attempt(scenario) -> None:
+    for first_success in (1, 2, 3, 9):
+        numbers = iter(range(1, 10))
+
+        def reach(request: ReachRequest, numbers=numbers, success=first_success) -> ReachRecord:
+            return replace(make_record(request), success=next(numbers) == success)
+
+        done = run_trial(scenario, Watched(), "evaluation", 5, GOAL, 4, reach=reach)
+        assert len(done) == min(first_success, 4)
+        won = [attempt.record.success for attempt in done]
+        assert won == [i == first_success for i in range(1, len(done) + 1)]
+
+
+@BOTH
+def test_a_reach_is_the_selections_in_the_environment_with_the_goal(scenario) -> None:
+    selector = Watched()
+    for attempt in run_trial(scenario, selector, "evaluation", 5, GOAL, 3, reach=failing):
+        request, chosen = attempt.request, attempt.selection
+        assert (request.stream, request.environment) == ("evaluation", 5)
+        assert request.goal == tuple(GOAL)
+        assert request.start == tuple(chosen.x0)
+        assert request.base == tuple(chosen.p_WR)
+        assert attempt.record.key == request.key
+        assert chosen.method == "rnd"
+    # The apertures are those of the environment.
+    instance = scenario.sample_instance("evaluation", 5)
+    if instance.p_WA is not None:
+        for situation in selector.situations:
+            np.testing.assert_array_equal(situation.starts.p_WA, instance.p_WA)
+
+
+@BOTH
+def test_later_attempts_come_after_the_earlier_ones(scenario) -> None:
+    first, second, third = run_trial(
+        scenario, Watched(), "evaluation", 5, GOAL, 3, reach=failing
+    )
+    assert first.request.after == ()
+    assert second.request.before() == first.request
+    assert third.request.before() == second.request
+
+
+@BOTH
+def test_fresh_attempts_come_after_nothing(scenario) -> None:
+    done = run_trial(scenario, Watched(), "evaluation", 5, GOAL, 3, fresh=True, reach=failing)
+    assert [attempt.request.after for attempt in done] == [(), (), ()]
+
+
+@BOTH
+def test_a_strategy_knows_what_the_failed_attempts_showed(scenario) -> None:
+    selector = Watched()
+    done = run_trial(scenario, selector, "evaluation", 5, GOAL, 3, reach=failing)
+    assert [len(situation.failed) for situation in selector.situations] == [0, 1, 2]
+    for failed, attempt in zip(selector.situations[-1].failed, done[:2], strict=True):
+        np.testing.assert_array_equal(failed.x0, attempt.selection.x0)
+        np.testing.assert_array_equal(failed.p_WR, attempt.selection.p_WR)
+        np.testing.assert_array_equal(failed.shown["final_x"], attempt.record.final_x)
+        np.testing.assert_array_equal(failed.shown["final_vy"], attempt.record.final_vy)
+
+
+def test_selection_knows_the_planar_arm_only() -> None:
+    scenario = load_scenario("cylinder-clutter")
+
+    class Other:
+        robot = "other"
+
+        def arm(self) -> object:
+            return object()
+
+    assert planar_arm_of(scenario) is scenario.arm()
+    with pytest.raises(RequestError, match="selection knows the planar arm only, not 'other'"):
+        planar_arm_of(Other())  # type: ignore[arg-type]
