@@ -1,22 +1,53 @@
 #!/bin/sh
-# The 2-D evaluation at the paper's scale: libraries, trials, bounds. Resumable; `lic` and `python`
-# must be those of the project.
+# The 2-D evaluation at the paper's scale: libraries, trials, bounds. Takes some hours on two cores;
+# run again, it goes on where it was. `lic` and `python` must be those of the project.
 set -eu
 cd "$(dirname "$0")/.."
 results=notebooks/results
 
 lic collect models/experience/cylinder-clutter --environments 20
-lic collect models/experience/passage-clutter --scenario passage-clutter --environments 120
-lic collect models/experience/cylinder-aperture-clutter --scenario cylinder-aperture-clutter \
-    --environments 480
+for library in "passage-clutter 120" "cylinder-aperture-clutter 480"; do
+    # shellcheck disable=SC2086
+    set -- $library
+    [ -e "models/experience/$1/training.parquet" ] ||
+        lic collect "models/experience/$1" --scenario "$1" --environments "$2"
+done
 
-# evaluate CATEGORY ENVIRONMENTS GOALS METHODS...: trials, and second attempts chosen otherwise.
+# evaluate CATEGORY ENVIRONMENTS GOALS OPTIONS...
 evaluate() {
     category=$1 environments=$2 goals=$3
     shift 3
     lic evaluate "$results/$category" --library "models/experience/$category" \
-        --environments "$environments" --goals "$goals" --attempts 2 --methods "$@"
+        --environments "$environments" --goals "$goals" "$@"
 }
-evaluate cylinder-clutter 200 10 rnd cost gp knn
-evaluate passage-clutter 2000 1 rnd cost gp knn
-evaluate cylinder-aperture-clutter 1000 1 rnd cost gp knn
+
+for category in "cylinder-clutter 200 10" "passage-clutter 2000 1" "cylinder-aperture-clutter 1000 1"; do
+    # Tables I to IV.
+    evaluate $category --methods rnd cost gp knn
+    # Other second choices after LIC-1's failures.
+    evaluate $category --methods gp1 'gp>cost' 'gp>rnd'
+done
+# How much it matters that the first attempt moved objects.
+evaluate cylinder-clutter 200 10 --methods rnd cost gp --fresh --variant fresh
+# LIC-2 from real second attempts.
+python scripts/collect_second_attempts.py models/experience/cylinder-clutter \
+    $results/second_attempts/cylinder-clutter --first 20 --environments 20
+evaluate cylinder-clutter 200 10 --methods gp --variant real-pairs \
+    --second-attempts $results/second_attempts/cylinder-clutter
+# Five attempts.
+evaluate cylinder-clutter 50 10 --methods rnd cost gp --attempts 5 --variant five-attempts
+
+# Bounds, and the strategies on the same goals.
+python scripts/measure_bounds.py cylinder-clutter --stream holdout --environments 40 --goals 10 \
+    --common-goals
+python scripts/measure_bounds.py passage-clutter --stream holdout --environments 300
+python scripts/measure_bounds.py cylinder-aperture-clutter --stream evaluation --environments 100
+evaluate_on_bounds() {
+    category=$1
+    shift
+    lic evaluate "$results/bounds/$category" --library "models/experience/$category" "$@"
+}
+evaluate_on_bounds cylinder-clutter --stream holdout --common-goals --environments 40 --goals 10
+evaluate_on_bounds passage-clutter --stream holdout --environments 300
+evaluate_on_bounds cylinder-aperture-clutter --environments 100
+python scripts/learning_curve.py

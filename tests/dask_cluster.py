@@ -32,7 +32,8 @@ class DaskCluster:
             *("--no-dashboard", "--dashboard-address", "127.0.0.1:0"),
             *("--scheduler-file", str(self._file)),
         )
-        wait_until(self._file.exists)
+        # Dask makes the file first and writes into it afterwards.
+        wait_until(lambda: self._file.exists() and self._file.read_text().endswith("}"))
         self.address = str(json.loads(self._file.read_text())["address"])
 
     def add_workers(

@@ -9,6 +9,7 @@ import os
 import sys
 import weakref
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +26,8 @@ from lic_drake.evaluate.batch import random_requests
 from lic_drake.reach import environment as reach_environment
 from lic_drake.reach import recording, rollout, waking
 from lic_drake.reach.diagram import ReachDiagram, make_reach_diagram
-from lic_drake.reach.recording import ReachRecording
 from lic_drake.reach.environment import Environment
+from lic_drake.reach.recording import ReachRecording
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import load_scenario
 
@@ -65,6 +66,21 @@ def test_only_the_diagram_of_the_last_environment_stays(built: list["weakref.ref
     for environment in range(5):
         run_reach(reach_request(small_clutter(0.2), environment=environment))
     assert len(built) == 5 * len(ONE_DIAGRAM)
+    assert alive(built) == ONE_DIAGRAM
+    rollout._environments.clear()
+    assert alive(built) == []
+
+
+def test_diagrams_of_other_bases_and_histories_die_with_the_environment(
+    built: list["weakref.ref[Any]"],
+) -> None:
+    request = reach_request(small_clutter(0.04))
+    x0 = np.array(request.start)
+    run_reach(request)
+    run_reach(replace(request, base=(0.0, 0.05)))
+    run_reach(request.then(x0, np.zeros(2)))
+    assert alive(built) == sorted(3 * ONE_DIAGRAM)
+    run_reach(replace(request, environment=1))
     assert alive(built) == ONE_DIAGRAM
     rollout._environments.clear()
     assert alive(built) == []

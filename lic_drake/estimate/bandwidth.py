@@ -12,6 +12,7 @@ from lic_drake.estimate.checks import Vector, feature_scale
 from lic_drake.seeds import make_generator
 
 _MAX_POINTS = 500
+_NEIGHBOURS = 100
 # Bandwidths in standard deviations of their feature: from nearest neighbours only to a feature
 # that tells nothing.
 _SMALLEST, _LARGEST = 0.02, 8.0
@@ -44,25 +45,23 @@ def gaussian_weights(distance: Vector) -> Vector:
     return weights
 
 
-def select_bandwidths(
-    rows: AveragedRows, neighbours: int, f: Vector, fold: NDArray[np.intp]
-) -> Vector:
+def select_bandwidths(rows: AveragedRows, f: Vector, fold: NDArray[np.intp]) -> Vector:
     """Returns the bandwidth of each feature, shape (d,), by search along one after the other.
 
-    Sought is the least squared error in folds that were held out, at 500 points at most. Where
-    features matter differently, as a start's orientation and a goal's distance do, a common
-    bandwidth in standard deviations averages too much along one and too little along the other.
+    Sought is the least squared error in folds that were held out, at 500 points at most and with
+    100 neighbours. Where features matter differently, as a start's orientation and a goal's
+    distance do, a common bandwidth in standard deviations averages too much along one and too
+    little along the other.
 
     Args:
         rows: The distinct points.
-        neighbours: Number of points averaged.
         f: Success of each reach, shape (n,).
         fold: Fold of each reach, shape (n,).
     """
     scale = feature_scale(rows.Z)
-    if min(neighbours, len(rows.Z)) == 1:
-        return scale  # a single neighbour weighs the same at any bandwidth
-    error = _held_out_error(rows, neighbours, f, fold)
+    if len(rows.Z) == 1 or fold.max() == 0:
+        return scale  # Nothing can be held out.
+    error = _held_out_error(rows, f, fold)
     common = float(min(_COMMON, key=lambda factor: error(factor * scale)))
     return _improve(error, common * scale, scale, np.ptp(rows.Z, axis=0) > 0.0)
 
@@ -89,7 +88,7 @@ def _improve(
 
 
 def _held_out_error(
-    rows: AveragedRows, neighbours: int, f: Vector, fold: NDArray[np.intp]
+    rows: AveragedRows, f: Vector, fold: NDArray[np.intp]
 ) -> Callable[[Vector], float]:
     """Returns the squared error as a function of the bandwidths."""
     tries, successes = _count_by_fold(len(rows.Z), rows.member, f, fold)
@@ -103,7 +102,7 @@ def _held_out_error(
 
     def error(bandwidth: Vector) -> float:
         points = rows.Z / bandwidth
-        distance, index = query_neighbours(cKDTree(points), points[tried], neighbours)
+        distance, index = query_neighbours(cKDTree(points), points[tried], _NEIGHBOURS)
         weight = csr_array(
             (
                 gaussian_weights(distance).ravel(),

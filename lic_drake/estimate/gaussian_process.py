@@ -13,8 +13,12 @@ from lic_drake.estimate.estimator import Prediction
 from lic_drake.estimate.folds import selection_folds
 from lic_drake.estimate.likelihood import Hyperparameters, fit_hyperparameters
 from lic_drake.estimate.posterior import Posterior, condition
+from lic_drake.seeds import make_generator
 
 _DESIGN_EFFECTS = (1.0, 2.0, 4.0, 8.0, 16.0)
+# A matrix of that many rows takes half a gigabyte. The search for settings inverts hundreds.
+_MAX_ROWS = 8000
+_MAX_SETTINGS_ROWS = 1000
 
 
 class GaussianProcess:
@@ -53,15 +57,9 @@ class GaussianProcess:
         """The hyper-parameters in use.
 
         Raises:
-            EstimateError: Not fitted yet.
+            EstimateError: Neither given nor fitted yet.
         """
-        return self._fitted().hyperparameters
-
-    @property
-    def length_scale(self) -> Vector:
-        """How far rows speak for each other along each feature, shape (d,): 1 / theta."""
-        scale: Vector = 1.0 / self.hyperparameters.theta
-        return scale
+        return self._fitted().hyperparameters if self._given is None else self._given
 
     def fit(self, Z: ArrayLike, f: ArrayLike, environment: ArrayLike | None = None) -> Self:
         """Learns from features Z, shape (n, d), and successes f, shape (n,); see `Predictor`."""
@@ -73,7 +71,13 @@ class GaussianProcess:
             if hyperparameters is None:
                 fold = selection_folds(environment, len(f))
                 hyperparameters = self._choose_hyperparameters(Z, f, fold)
-            self._posterior = condition(self._rows(Z, f), hyperparameters)
+            rows = self._rows(Z, f)
+            if len(rows.Z) > _MAX_ROWS:
+                raise EstimateError(
+                    f"an exact Gaussian process takes at most {_MAX_ROWS} distinct rows, got"
+                    f" {len(rows.Z)}; use the estimator 'gp-raw' or 'knn'"
+                )
+            self._posterior = condition(rows, hyperparameters)
         return self
 
     def conditioned_on(self, Z: ArrayLike, f: ArrayLike) -> "GaussianProcess":
@@ -113,6 +117,10 @@ class GaussianProcess:
     def _choose_hyperparameters(
         self, Z: Vector, f: Vector, fold: NDArray[np.intp]
     ) -> Hyperparameters:
+        if len(self._rows(Z, f).Z) > _MAX_SETTINGS_ROWS:
+            order = make_generator("training", "rows for settings").permutation(len(f))
+            part = order[:_MAX_SETTINGS_ROWS]
+            Z, f, fold = Z[part], f[part], fold[part]
         rows = self._rows(Z, f)
         likeliest = fit_hyperparameters(
             rows.Z, rows.rate, rows.count, reach_variance(average_rows(Z, f))

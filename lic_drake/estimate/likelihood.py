@@ -12,7 +12,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dpotri
 from scipy.optimize import minimize
 
-from lic_drake.estimate.checks import EstimateError, Vector, feature_scale
+from lic_drake.estimate.checks import Vector, feature_scale
 from lic_drake.seeds import make_generator
 
 # Bounds of theta are per standard deviation of a feature: from nearly a straight line through
@@ -20,8 +20,6 @@ from lic_drake.seeds import make_generator
 _BOUNDS = {"theta": (1e-3, 10.0), "signal": (1e-4, 4.0), "floor": (1e-6, 0.25)}
 _THETA_STARTS = (0.05, 0.3, 1.5)
 _MAX_SEARCH_ROWS = 300
-# Matrices of this many rows take about a gigabyte during the search.
-_MAX_ROWS = 4000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,15 +97,7 @@ def fit_hyperparameters(
         y: Observed rates, shape (n,).
         count: Number of reaches in each row, shape (n,).
         reach_variance: Noise variance of a single reach.
-
-    Raises:
-        EstimateError: More than 4,000 rows, which would take more than a gigabyte.
     """
-    if len(Z) > _MAX_ROWS:
-        raise EstimateError(
-            f"an exact Gaussian process takes at most {_MAX_ROWS} distinct rows, got {len(Z)};"
-            " use the estimator 'gp-raw' or 'knn'"
-        )
     scale = feature_scale(Z)
     Z = Z / scale
     noise = reach_variance / count

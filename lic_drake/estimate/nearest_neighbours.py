@@ -44,7 +44,7 @@ class NearestNeighbours:
         neighbours: K, the number of distinct feature vectors averaged.
     """
 
-    def __init__(self, *, neighbours: int = 200, bandwidth: ArrayLike | None = None) -> None:
+    def __init__(self, *, neighbours: int = 100, bandwidth: ArrayLike | None = None) -> None:
         """Sets up an estimator.
 
         Args:
@@ -60,7 +60,7 @@ class NearestNeighbours:
         if neighbours < 1 or (given is not None and not np.all(given > 0.0)):
             raise EstimateError(
                 "nearest neighbours need 1 or more neighbours and positive bandwidths,"
-                f" got {neighbours} and {bandwidth}"
+                f" got {neighbours} and {given}"
             )
         self.neighbours = neighbours
         self._given = given
@@ -78,18 +78,13 @@ class NearestNeighbours:
             raise EstimateError("the bandwidth is not chosen yet; call fit(Z, f) first")
         return self._chosen
 
-    @property
-    def length_scale(self) -> Vector:
-        """How far rows speak for each other along each feature, shape (d,): the bandwidths."""
-        return self.bandwidth
-
     def fit(self, Z: ArrayLike, f: ArrayLike, environment: ArrayLike | None = None) -> Self:
         """Learns from features Z, shape (n, d), and successes f, shape (n,); see `Predictor`."""
         Z, f = checked_rows(Z, f)
         rows = average_rows(Z, f)
         if self._given is None:
             fold = selection_folds(environment, len(f))
-            self._chosen = select_bandwidths(rows, self.neighbours, f, fold)
+            self._chosen = select_bandwidths(rows, f, fold)
         points = rows.Z / self.bandwidth
         self._points = _Points(
             tree=cKDTree(points), points=points, rate=rows.rate, count=rows.count

@@ -1,12 +1,14 @@
 """The known success estimators. A new one is a new file and one line here."""
 
 from collections.abc import Callable
+from functools import partial
 
 from lic_drake.estimate.checks import EstimateError
 from lic_drake.estimate.estimator import SuccessEstimator
 from lic_drake.estimate.features import PLANAR_LIC1, FeatureMap
 from lic_drake.estimate.gaussian_process import GaussianProcess
 from lic_drake.estimate.local import LocalEstimator
+from lic_drake.estimate.local_process import choose_process
 from lic_drake.estimate.nearest_neighbours import NearestNeighbours
 
 EstimatorFactory = Callable[[FeatureMap], SuccessEstimator]
@@ -42,17 +44,19 @@ def estimator_names() -> tuple[str, ...]:
 
 
 def _process(features: FeatureMap) -> SuccessEstimator:
-    """All rows of LIC-1, averaged; of LIC-2's many rows the nearest."""
+    """All rows of LIC-1; of LIC-2's many rows the nearest."""
     if not features.observed:
         return GaussianProcess()
-    return LocalEstimator(GaussianProcess(average=False), features.situation)
+    return LocalEstimator(choose_process, features.situation, size=800)
 
 
 def _neighbours(features: FeatureMap) -> SuccessEstimator:
     if not features.observed:
         return NearestNeighbours()
     return LocalEstimator(
-        NearestNeighbours(neighbours=400), features.situation, size=2000, settings_size=20_000
+        lambda near: NearestNeighbours(neighbours=400, bandwidth=near.length_scale),
+        features.situation,
+        size=2000,
     )
 
 
@@ -60,5 +64,7 @@ register_estimator("gp", _process)
 register_estimator("knn", _neighbours)
 register_estimator(
     "gp-raw",
-    lambda features: LocalEstimator(GaussianProcess(average=False), features.situation),
+    lambda features: LocalEstimator(
+        partial(choose_process, average=False), features.situation, size=800
+    ),
 )

@@ -99,13 +99,9 @@ class Starts(Protocol):
         ...
 
 
-def find_region(regions: Sequence[Region], x0: Vector, p_WR: Vector) -> Region:
-    """Returns the region that holds an initial condition, up to the rounding of grids.
-
-    Raises:
-        StopIteration: None does.
-    """
-    return next(region for region in regions if region.holds(x0, p_WR, 1e-5))
+def find_region(regions: Sequence[Region], x0: Vector, p_WR: Vector) -> Region | None:
+    """Returns the region that holds an initial condition, up to the rounding of grids, if any."""
+    return next((region for region in regions if region.holds(x0, p_WR, 1e-5)), None)
 
 
 def is_possible(starts: Starts, x0: Vector, p_WR: Vector) -> bool:

@@ -117,7 +117,8 @@ class LicSelector:
         """Returns where the optimisation ends from a candidate, None if that is not possible."""
         region = find_region(regions, x0, p_WR)
         q = self._arm.solve_ik(x0 - [*p_WR, 0.0])
-        if q is None:
+        # A candidate just beside the end of a region is one that nothing can improve.
+        if q is None or region is None:
             return None
         x0, p_WR = self._program.solve(objective, region, x0, p_WR, q)
         x0 = np.clip(x0, region.lower, region.upper)
@@ -144,6 +145,8 @@ class LbfgsbSelector(LicSelector):
     ) -> InitialConditions | None:
         poses = situation.starts.poses
         region = find_region(regions, x0, p_WR)
+        if region is None:
+            return None
         # Moving the base to the left moves the hand to the right of it.
         y_low = max(region.lower[1] - region.base_upper[1], poses.y_range[0])
         y_high = min(region.upper[1] - region.base_lower[1], poses.y_range[1])

@@ -1,12 +1,20 @@
 """Libraries with a known probability of success, on the grid of the paper's cylinder-clutter."""
 
+import dataclasses
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.reach.request import ReachRecord
+from lic_drake.reach.scenario import load_scenario
+
 Vector = NDArray[np.float64]
+
+BLANK = {str: "", int: 0, float: 0.0, bool: False, tuple[float, ...]: ()}
 
 GOALS = [(x, y) for x in (0.4, 0.5, 0.6, 0.7, 0.8) for y in np.linspace(-0.4, 0.4, 9).round(9)]
 # Position of the hand, metres: orientations in degrees. The 21 that the joint limits leave.
@@ -103,3 +111,32 @@ def scattered() -> Library:
     Z = rng.uniform([0.4, -0.4, -0.4, -1.0], [0.8, 0.4, 0.4, 1.5], (60, 4))
     f = (rng.random(60) < World().probability(Z)).astype(float)
     return Library(Z=Z, f=f, environment=np.repeat(np.arange(6), 10))
+
+
+@pytest.fixture
+def library(world, tmp_path: Path) -> Path:
+    """Every third pair of the grid, in six environments."""
+    scenario = load_scenario("cylinder-clutter")
+    rows = world.library(environments=6)
+    records = []
+    for i in range(0, len(rows.f), 3):
+        goal_x, goal_y, start_y, start_phi = map(float, rows.Z[i])
+        values = {
+            "category": "cylinder-clutter",
+            "key": f"{i:016x}",
+            "scenario": scenario.digest,
+            "stream": "training",
+            "environment": int(rows.environment[i]),
+            "goal_x": goal_x,
+            "goal_y": goal_y,
+            "start_x": 0.335,
+            "start_y": start_y,
+            "start_phi": start_phi,
+            "success": bool(rows.f[i]),
+            "outcome": "reached" if rows.f[i] else "stuck",
+        }
+        blank = {field.name: BLANK[field.type] for field in dataclasses.fields(ReachRecord)}
+        records.append(ReachRecord(**(blank | values)))
+    path = tmp_path / "library"
+    ExperienceLibrary(path).write_shard("all", records, scenario)
+    return path

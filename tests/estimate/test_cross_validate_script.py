@@ -1,5 +1,4 @@
 import csv
-import dataclasses
 import importlib.util
 import sys
 from pathlib import Path
@@ -8,12 +7,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.reach.request import ReachRecord
-from lic_drake.reach.scenario import load_scenario
-
 SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "cross_validate.py"
-BLANK = {str: "", int: 0, float: 0.0, bool: False, tuple[float, ...]: ()}
 
 
 @pytest.fixture
@@ -23,33 +17,6 @@ def script() -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
-
-
-@pytest.fixture
-def library(world, tmp_path: Path) -> Path:
-    """Every third pair of the grid, in six environments."""
-    scenario = load_scenario("cylinder-clutter")
-    rows = world.library(environments=6)
-    records = []
-    for i in range(0, len(rows.f), 3):
-        goal_x, goal_y, start_y, start_phi = map(float, rows.Z[i])
-        values = {
-            "key": f"{i:016x}",
-            "scenario": scenario.digest,
-            "stream": "training",
-            "environment": int(rows.environment[i]),
-            "goal_x": goal_x,
-            "goal_y": goal_y,
-            "start_y": start_y,
-            "start_phi": start_phi,
-            "success": bool(rows.f[i]),
-            "outcome": "reached" if rows.f[i] else "stuck",
-        }
-        blank = {field.name: BLANK[field.type] for field in dataclasses.fields(ReachRecord)}
-        records.append(ReachRecord(**(blank | values)))
-    path = tmp_path / "library"
-    ExperienceLibrary(path).write_shard("all", records, scenario)
-    return path
 
 
 def _run(script: ModuleType, monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:

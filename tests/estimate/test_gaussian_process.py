@@ -131,6 +131,24 @@ def test_a_feature_that_never_varies_has_no_influence() -> None:
     assert low < 0.3 < 0.7 < high
 
 
+def test_settings_of_many_rows_come_from_a_part_and_the_estimate_from_all(world) -> None:
+    rng = np.random.default_rng(0)
+    Z = rng.uniform([0.4, -0.4, -0.4, -1.0], [0.8, 0.4, 0.4, 1.5], (1500, 4))
+    f = (rng.random(1500) < world.probability(Z)).astype(float)
+    process = GaussianProcess().fit(Z, f, np.arange(1500) // 10)
+    expected = GaussianProcess(hyperparameters=process.hyperparameters).fit(Z, f)
+    queries = rng.uniform([0.4, -0.4, -0.4, -1.0], [0.8, 0.4, 0.4, 1.5], (200, 4))
+    np.testing.assert_array_equal(process.values(queries), expected.values(queries))
+    truth = world.probability(queries)
+    assert np.mean((process.values(queries) - truth) ** 2) < 0.3 * np.var(truth)
+
+
+def test_more_rows_than_memory_allows_are_refused() -> None:
+    process = GaussianProcess(hyperparameters=PRIOR)
+    with pytest.raises(EstimateError, match=r"at most 8000 .* got 8001.*'gp-raw'"):
+        process.fit(np.arange(4.0 * 8001).reshape(8001, 4), np.zeros(8001))
+
+
 def test_asking_before_fitting_says_what_to_do() -> None:
     process = GaussianProcess()
     with pytest.raises(EstimateError, match="call fit"):

@@ -5,7 +5,6 @@ from hypothesis import strategies as st
 from scipy.stats import multivariate_normal
 
 from lic_drake.estimate.averaging import average_rows, reach_variance
-from lic_drake.estimate.checks import EstimateError
 from lic_drake.estimate.likelihood import (
     coordinate_distances,
     fit_hyperparameters,
@@ -79,8 +78,3 @@ def test_scales_follow_the_units_of_the_features(world) -> None:
     in_metres = fit_hyperparameters(rows.Z, rows.rate, rows.count, variance)
     in_others = fit_hyperparameters(rows.Z * unit, rows.rate, rows.count, variance)
     np.testing.assert_allclose(in_others.theta * unit, in_metres.theta, rtol=1e-3)
-
-
-def test_more_rows_than_memory_allows_are_refused() -> None:
-    with pytest.raises(EstimateError, match=r"at most 4000 .* got 4001.*'gp-raw'"):
-        fit_hyperparameters(np.zeros((4001, 1)), np.zeros(4001), np.ones(4001), 0.1)

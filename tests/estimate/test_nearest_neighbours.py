@@ -51,7 +51,6 @@ def test_given_other_rows_the_bandwidths_stay(scattered) -> None:
     queries = scattered.Z[:20] + 0.02
     expected = theirs.predict(queries / ours.bandwidth)
     np.testing.assert_allclose(other.values(queries), expected, rtol=1e-9)
-    np.testing.assert_array_equal(ours.length_scale, ours.bandwidth)
 
 
 def test_far_from_all_rows_the_nearest_decide() -> None:

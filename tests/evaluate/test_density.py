@@ -4,6 +4,7 @@ from select_surfaces import random_model
 from starts import APERTURES, ARM, LINE
 
 from lic_drake.evaluate.density import DENSITY_SHAPE, density_lattice, estimate_density
+from lic_drake.reach.starts import Starts
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.situation import Situation
 
@@ -11,7 +12,9 @@ GOAL = np.array([0.6, 0.1, 0.0])
 
 
 @pytest.mark.parametrize("starts", [LINE, APERTURES], ids=["line", "apertures"])
-def test_a_density_covers_the_start_line_relative_to_the_base_in_every_region(starts) -> None:
+def test_a_density_covers_the_line_relative_to_the_base_in_every_region(
+    starts: Starts,
+) -> None:
     line = starts.poses.line
     for region in starts.regions:
         conditions, shape = density_lattice(starts, region)
@@ -30,7 +33,7 @@ def test_a_density_covers_the_start_line_relative_to_the_base_in_every_region(st
 
 
 @pytest.mark.parametrize("starts", [LINE, APERTURES], ids=["line", "apertures"])
-def test_estimates_are_the_models_where_the_arm_can_start(starts) -> None:
+def test_estimates_are_the_models_where_the_arm_can_start(starts: Starts) -> None:
     model = random_model(3)
     selector = LicSelector(ARM, model)
     conditions, _ = density_lattice(starts, starts.regions[0])

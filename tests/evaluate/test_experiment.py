@@ -19,9 +19,11 @@ from lic_drake.reach.scenario import load_scenario
 EASY = "{clutter: {num_movable: 2, num_fixed: 2}, stop: {timeout_s: 0.2}}"
 
 
-def make_library(path: Path, category: str = "cylinder-clutter") -> ExperienceLibrary:
+def make_library(
+    path: Path, category: str = "cylinder-clutter", overrides: str = EASY
+) -> ExperienceLibrary:
     """A library in which every start left of the middle succeeds, and no other."""
-    scenario = load_scenario(category, EASY)
+    scenario = load_scenario(category, overrides)
     library = ExperienceLibrary(path)
     request = make_request(scenario=scenario, max_goals=6, max_starts=9)
     for environment in range(3):
@@ -74,7 +76,7 @@ def evaluation(tmp_path: Path, **values: Any) -> Evaluation:
     defaults: dict[str, Any] = {
         "experience": tmp_path / "library",
         "results": tmp_path / "out",
-        "methods": ("rnd", "knn"),
+        "methods": ("rnd", "gp1"),
         "environments": 3,
         "goals": 2,
     }
@@ -106,16 +108,16 @@ def test_strategies_are_tried_at_the_same_goals_of_the_same_environments(
         method: [(row.environment, row.goal) for row in firsts if row.method == method]
         for method in asked.methods
     }
-    assert tried["rnd"] == tried["knn"] == [(e, g) for e in (7, 8, 9) for g in (0, 1)]
+    assert tried["rnd"] == tried["gp1"] == [(e, g) for e in (7, 8, 9) for g in (0, 1)]
     for row in rows:
         record = records[row.key]
         assert (record.stream, record.environment) == ("evaluation", row.environment)
         expected = scenario.sample_goal("evaluation", row.environment, row.goal)
         np.testing.assert_array_equal(record.p_WG, expected)
     # What was learned from the library: starts left of the middle.
-    assert all(records[row.key].start_y > 0.0 for row in firsts if row.method == "knn")
+    assert all(records[row.key].start_y > 0.0 for row in firsts if row.method == "gp1")
     assert any(records[row.key].start_y < 0.0 for row in firsts if row.method == "rnd")
-    assert lines[-1].startswith(f"  1/1 blocks, {len(rows)} attempts, knn ")
+    assert lines[-1].startswith(f"  1/1 blocks, {len(rows)} attempts, gp1 ")
 
 
 def test_rows_agree_with_the_library_of_reaches(tmp_path: Path, calls: list[str]) -> None:
@@ -214,11 +216,11 @@ def test_the_file_keeps_the_trials_of_other_variants_and_strategies(
     plain = evaluation(tmp_path, methods=("rnd", "cost"))
     rows = run_evaluation(plain, say=quiet)
     fresh = run_evaluation(replace(plain, fresh=True, variant="fresh"), say=quiet)
-    more = run_evaluation(replace(plain, methods=("knn",)), say=quiet)
-    assert file() == [("", "cost"), ("", "knn"), ("", "rnd"), ("fresh", "cost"), ("fresh", "rnd")]
+    more = run_evaluation(replace(plain, methods=("gp1",)), say=quiet)
+    assert file() == [("", "cost"), ("", "gp1"), ("", "rnd"), ("fresh", "cost"), ("fresh", "rnd")]
     # Again with fewer environments: those trials replace the older ones of the same name.
     fewer = run_evaluation(replace(plain, methods=("rnd",), environments=1), say=quiet)
-    assert file() == [("", "cost"), ("", "knn"), ("", "rnd"), ("fresh", "cost"), ("fresh", "rnd")]
+    assert file() == [("", "cost"), ("", "gp1"), ("", "rnd"), ("fresh", "cost"), ("fresh", "rnd")]
     expected = [*(row for row in rows if row.method == "cost"), *fresh, *more, *fewer]
     stored = read_trials(tmp_path / "out" / "trials.parquet")
     assert sorted(without_times(stored)) == sorted(without_times(expected))
@@ -275,9 +277,6 @@ def test_two_processes_give_the_rows_and_reaches_of_one(
     assert len(results[0][0]) > 6
     # Simulated ones: none takes longer than it may.
     assert max(record.duration_s for record in asked.reaches.records()) == pytest.approx(0.2)
-    again = {record.key: record.wall_time_s for record in asked.reaches.records()}
-    run_evaluation(asked, 2, quiet)
-    assert {r.key: r.wall_time_s for r in asked.reaches.records()} == again
 
 
 def test_unknown_method_is_refused_before_any_reach(tmp_path: Path, calls: list[str]) -> None:
@@ -291,7 +290,7 @@ def test_results_of_another_scenario_are_refused_before_any_reach(
     tmp_path: Path, calls: list[str]
 ) -> None:
     run_evaluation(evaluation(tmp_path), say=quiet)
-    make_library(tmp_path / "other", "passage-clutter")
+    make_library(tmp_path / "other", overrides="{stop: {timeout_s: 0.4}}")
     calls.clear()
     with pytest.raises(LibraryError, match="holds reaches of another scenario"):
         run_evaluation(evaluation(tmp_path, experience=tmp_path / "other", goals=1), say=quiet)

@@ -7,7 +7,7 @@ from fake_reach import make_record
 from lic_drake.errors import RequestError
 from lic_drake.evaluate.trial import planar_arm_of, run_trial
 from lic_drake.reach.request import ReachRecord, ReachRequest
-from lic_drake.reach.scenario import load_scenario
+from lic_drake.reach.scenario import Scenario, load_scenario
 from lic_drake.select.baselines import RandomSelector
 from lic_drake.select.situation import Selection, Situation
 
@@ -37,7 +37,7 @@ def failing(request: ReachRequest) -> ReachRecord:
 
 
 @BOTH
-def test_a_trial_ends_with_its_first_success_or_its_last_attempt(scenario) -> None:
+def test_a_trial_ends_with_its_first_success_or_its_last_attempt(scenario: Scenario) -> None:
     for first_success in (1, 2, 3, 9):
         numbers = iter(range(1, 10))
 
@@ -51,7 +51,7 @@ def test_a_trial_ends_with_its_first_success_or_its_last_attempt(scenario) -> No
 
 
 @BOTH
-def test_a_reach_is_the_selections_in_the_environment_with_the_goal(scenario) -> None:
+def test_a_reach_is_the_selections_in_the_environment_with_the_goal(scenario: Scenario) -> None:
     selector = Watched()
     for attempt in run_trial(scenario, selector, "evaluation", 5, GOAL, 3, reach=failing):
         request, chosen = attempt.request, attempt.selection
@@ -69,23 +69,21 @@ def test_a_reach_is_the_selections_in_the_environment_with_the_goal(scenario) ->
 
 
 @BOTH
-def test_later_attempts_come_after_the_earlier_ones(scenario) -> None:
-    first, second, third = run_trial(
-        scenario, Watched(), "evaluation", 5, GOAL, 3, reach=failing
-    )
+def test_later_attempts_come_after_the_earlier_ones(scenario: Scenario) -> None:
+    first, second, third = run_trial(scenario, Watched(), "evaluation", 5, GOAL, 3, reach=failing)
     assert first.request.after == ()
     assert second.request.before() == first.request
     assert third.request.before() == second.request
 
 
 @BOTH
-def test_fresh_attempts_come_after_nothing(scenario) -> None:
+def test_fresh_attempts_come_after_nothing(scenario: Scenario) -> None:
     done = run_trial(scenario, Watched(), "evaluation", 5, GOAL, 3, fresh=True, reach=failing)
     assert [attempt.request.after for attempt in done] == [(), (), ()]
 
 
 @BOTH
-def test_a_strategy_knows_what_the_failed_attempts_showed(scenario) -> None:
+def test_a_strategy_knows_what_the_failed_attempts_showed(scenario: Scenario) -> None:
     selector = Watched()
     done = run_trial(scenario, selector, "evaluation", 5, GOAL, 3, reach=failing)
     assert [len(situation.failed) for situation in selector.situations] == [0, 1, 2]

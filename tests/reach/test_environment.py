@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from reaches import free_space, reach_request, small_clutter, start_angles
@@ -110,8 +112,6 @@ def test_a_trace_tells_where_the_base_and_the_objects_are_in_the_world() -> None
 
 
 def test_a_record_gives_positions_in_the_world_and_the_base() -> None:
-    from dataclasses import replace
-
     base = (0.0, -0.25)
     scenario = small_clutter(1.0)
     request = reach_request(scenario, (0.65, -0.3), y_m=-0.2, phi_deg=60.0)

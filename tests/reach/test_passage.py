@@ -11,8 +11,8 @@ from worlds import ARM, corners, gap_to_boxes
 from lic_drake.errors import RequestError
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
-from lic_drake.reach.request import is_within_reach, make_request
 from lic_drake.reach.environment import Environment
+from lic_drake.reach.request import is_within_reach, make_request
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario, load_scenario, parse_scenario, to_dict
 

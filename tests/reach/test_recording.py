@@ -114,6 +114,28 @@ def test_a_recorded_reach_is_the_simulated_one(environment: int) -> None:
         np.testing.assert_array_equal(trace.states[-1].p_WO, trace.p_WO)
 
 
+def test_a_base_aside_carries_the_arm_in_the_recording(tmp_path: Path) -> None:
+    scenario = free_space(0.2)
+    clutter = make_clutter(cylinder(0.5, 0.35, movable=True))
+    recording, begin = ReachRecording(scenario, clutter), 0
+    kinematics, expected = scenario.arm().kinematics, {}
+    # The base stands elsewhere in each reach of a recording.
+    for base in (np.array([0.0, -0.3, 0.0]), np.zeros(3), np.array([0.05, 0.2, 0.0])):
+        environment = Environment(scenario, clutter, p_WR=base)
+        trace = environment.reach(P_WG + base, EASY_START + base, keep_states=True).trace
+        recording.add_reach(trace, P_WG + base)
+        for k, q in enumerate(trace.q):
+            expected[begin + 10 * k] = base[:2] + kinematics.link_origins(q)[2]
+        begin += TICKS_PER_SECOND * 2
+    recording.save(tmp_path / "reach.html")
+    html = (tmp_path / "reach.html").read_text(encoding="utf-8")
+    frames = positions_of(animation_of(html), LAST_LINK)
+    assert len(frames) == len(expected)
+    for tick, position in expected.items():
+        frame = frames[tick] if tick in frames else frames[tick - 1]
+        np.testing.assert_allclose(frame, [*position, 0.0], atol=1e-9)
+
+
 @pytest.mark.parametrize(("control", "frames"), [(25, 25), (100, 25), (30, 30), (31, 15.5), (1, 1)])
 def test_frames_are_drawn_at_control_instants(control: float, frames: float) -> None:
     assert frame_rate(control) == frames

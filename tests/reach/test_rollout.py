@@ -17,8 +17,8 @@ from worlds import box, cylinder, make_clutter
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.reach import rollout as dut
-from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.environment import Environment
+from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.rollout import make_record, run_reach
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.trace import ReachResult, ReachTrace

@@ -35,9 +35,7 @@ def angles_of(conditions: InitialConditions) -> list[np.ndarray]:
     return q
 
 
-def assert_all_possible(
-    starts: LineStarts | ApertureStarts, conditions: InitialConditions
-) -> None:
+def assert_all_possible(starts: LineStarts | ApertureStarts, conditions: InitialConditions) -> None:
     for x0, p_WR, q in zip(*conditions, angles_of(conditions), strict=True):
         assert_possible(starts, x0, p_WR, q)
         assert is_possible(starts, x0, p_WR)
@@ -172,10 +170,13 @@ def test_drawn_starts_are_uniform_among_the_possible_ones() -> None:
     scan = dense_scan(starts)
     for a, b in ((drawn.x0[:, 2], scan.x0[:, 2]), (drawn.p_WR[:, 1], scan.p_WR[:, 1])):
         assert ks_2samp(a, b).pvalue > 1e-3
-    assert abs(
-        np.corrcoef(drawn.x0[:, 2], drawn.p_WR[:, 1])[0, 1]
-        - np.corrcoef(scan.x0[:, 2], scan.p_WR[:, 1])[0, 1]
-    ) < 0.1
+    assert (
+        abs(
+            np.corrcoef(drawn.x0[:, 2], drawn.p_WR[:, 1])[0, 1]
+            - np.corrcoef(scan.x0[:, 2], scan.p_WR[:, 1])[0, 1]
+        )
+        < 0.1
+    )
 
 
 def test_an_aperture_out_of_the_tracks_reach_is_named() -> None:

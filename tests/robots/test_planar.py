@@ -3,10 +3,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydrake.geometry import SceneGraph
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import JacobianWrtVariable
+from pydrake.multibody.tree import FixedOffsetFrame, JacobianWrtVariable
 from pydrake.systems.framework import Context
 
 from lic_drake.paths import models_dir
@@ -36,6 +36,20 @@ def at(angles: tuple[float, ...]) -> tuple[np.ndarray, Context]:
     q = np.array(angles)
     PLANT.SetPositions(CONTEXT, q)
     return q, CONTEXT
+
+
+def test_the_base_is_welded_to_the_world_or_to_the_frame_that_is_given() -> None:
+    X_WF = RigidTransform(RollPitchYaw(0.0, 0.0, 0.7), np.array([0.3, -0.2, 0.1]))
+    for X_WR in (RigidTransform(), X_WF):
+        plant = MultibodyPlant(time_step=1e-3)
+        frame = plant.AddFrame(FixedOffsetFrame("mount", plant.world_frame(), X_WR))
+        arm = ARM.add_to_plant(plant, frame) if X_WR is X_WF else ARM.add_to_plant(plant)
+        plant.Finalize()
+        context = plant.CreateDefaultContext()
+        q = np.array([0.3, 0.4, 0.5])
+        plant.SetPositions(context, arm, q)
+        p_WE = plant.GetFrameByName("tip", arm).CalcPoseInWorld(context).translation()
+        np.testing.assert_allclose(p_WE, X_WR @ ARM.tip_position(q), atol=1e-12)
 
 
 def test_limits_gains_and_reach_are_those_of_the_testbed() -> None:

@@ -2,9 +2,10 @@ import numpy as np
 import pytest
 from pydrake.geometry import Box, Cylinder, Role, Sphere
 from pydrake.systems.analysis import ApplySimulatorConfig, SimulatorConfig
+from pydrake.systems.framework import DiagramBuilder
 from worlds import ARM, box, cylinder, make_clutter, make_world
 
-from lic_drake.scene.scene import SceneConfig, make_shape
+from lic_drake.scene.scene import SceneConfig, add_scene, make_shape
 
 PARKED = np.deg2rad([-140.0, 100.0, 120.0])
 CLUTTER = make_clutter(
@@ -59,6 +60,37 @@ def test_only_movable_objects_have_a_body_with_their_mass() -> None:
 def test_movable_objects_come_in_their_order_in_the_clutter_state() -> None:
     world = make_world(PARKED, CLUTTER, SceneConfig())
     np.testing.assert_array_equal(world.objects, CLUTTER.p_WO[CLUTTER.movable, :2])
+
+
+def test_a_base_stands_still_at_the_origin_unless_it_slides() -> None:
+    for slides in (False, True):
+        builder = DiagramBuilder()
+        scene = add_scene(builder, ARM, CLUTTER, SceneConfig(), base_slides=slides)
+        diagram = builder.Build()
+        context = diagram.CreateDefaultContext()
+        plant_context = scene.plant.GetMyMutableContextFromRoot(context)
+        assert scene.plant.num_positions(scene.base) == (2 if slides else 0)
+        assert scene.plant.num_positions(scene.arm) == 3
+        assert scene.plant.num_positions(scene.clutter) == 4
+        p_WR = np.zeros(2)
+        if slides:
+            p_WR = np.array([0.1, -0.4])
+            scene.plant.SetPositions(plant_context, scene.base, p_WR)
+        q = np.deg2rad([-30.0, 60.0, 50.0])
+        scene.plant.SetPositions(plant_context, scene.arm, q)
+        # The arm goes along; the clutter does not.
+        _, p_RL = ARM.link_poses(q)
+        for i, name in enumerate(ARM.link_names):
+            X_WL = scene.plant.EvalBodyPoseInWorld(
+                plant_context, scene.plant.GetBodyByName(name, scene.arm)
+            )
+            np.testing.assert_allclose(
+                X_WL.translation(), p_RL[i] + np.append(p_WR, 0.0), atol=1e-12
+            )
+        np.testing.assert_array_equal(
+            scene.plant.GetPositions(plant_context, scene.clutter).reshape(-1, 2),
+            CLUTTER.p_WO[CLUTTER.movable, :2],
+        )
 
 
 def test_nothing_moves_by_itself_in_the_horizontal_plane() -> None:

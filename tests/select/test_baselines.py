@@ -6,6 +6,7 @@ from scipy.stats import chisquare
 from starts import APERTURES, LINE
 
 from lic_drake.errors import RequestError
+from lic_drake.reach.starts import Starts
 from lic_drake.select.baselines import (
     CostSelector,
     RandomSelector,
@@ -111,7 +112,7 @@ def test_of_equally_cheap_starts_cost_takes_the_base_nearest_to_the_goals_y(
 
 
 @pytest.mark.parametrize("starts", [LINE, APERTURES])
-def test_selected_joint_angles_put_the_hand_at_the_start(starts) -> None:
+def test_selected_joint_angles_put_the_hand_at_the_start(starts: Starts) -> None:
     chosen = CostSelector().select(Situation(p_WG=GOAL, starts=starts))
     pose = starts.poses.arm.tip_pose(chosen.q) + [*chosen.p_WR, 0.0]
     np.testing.assert_allclose(pose, chosen.x0, atol=1e-12)

@@ -229,9 +229,7 @@ def test_lic2_may_start_where_the_first_reach_did() -> None:
         estimator=Bumps(peak, np.array([0.9]), np.array([0.1, 0.3])), features=SECOND_MODEL
     )
     selector = LicSelector(ARM, random_model(1), second)
-    situation = Situation(
-        p_WG=GOAL, starts=LINE, failed=(failed_at(np.array([0.335, 0.05, 0.9])),)
-    )
+    situation = Situation(p_WG=GOAL, starts=LINE, failed=(failed_at(np.array([0.335, 0.05, 0.9])),))
     np.testing.assert_allclose(selector.select(situation).x0[1:], peak[0], atol=2e-3)
 
 

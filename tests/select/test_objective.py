@@ -70,9 +70,7 @@ def test_moving_everything_together_changes_nothing(features: FeatureMap, failur
         shown = {name: x + shift.get(name[-2:], 0.0) for name, x in reach.shown.items()}
         return FailedReach(x0=reach.x0 + offset, p_WR=reach.p_WR + offset[:2], shown=shown)
 
-    there = Objective(
-        model=dut.model, p_WG=dut.p_WG + offset, failed=tuple(map(moved, dut.failed))
-    )
+    there = Objective(model=dut.model, p_WG=dut.p_WG + offset, failed=tuple(map(moved, dut.failed)))
     conditions_there = InitialConditions(at.x0 + offset, at.p_WR + offset[:2])
     np.testing.assert_allclose(there.values(conditions_there), dut.values(at), rtol=1e-9)
     # The base alone makes a difference.

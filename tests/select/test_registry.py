@@ -17,7 +17,7 @@ from lic_drake.select.registry import (
     method_names,
     needs_library,
 )
-from lic_drake.select.situation import FailedReach, Situation
+from lic_drake.select.situation import FailedReach, Selection, Situation
 
 GOAL = np.array([0.6, 0.1, 0.0])
 
@@ -40,7 +40,7 @@ def test_a_known_strategy_is_accepted_and_named_in_its_selections(
 
 @pytest.mark.parametrize("method", ["svm", "", "gp2", ">", "gp>", ">cost", "gp>cost>rnd", "GP"])
 def test_an_unknown_strategy_is_refused_with_the_known_ones(method: str) -> None:
-    with pytest.raises(RequestError, match="choose one of rnd, cost, gp, .* as in gp>cost") as e:
+    with pytest.raises(RequestError, match=r"choose one of rnd, cost, gp, .* as in gp>cost") as e:
         check_method(method)
     assert f"unknown method {method!r}" in str(e.value)
     for use in (needs_library, lambda name: make_selector(name, ARM, {})):
@@ -71,7 +71,7 @@ def test_one_strategy_for_the_first_attempt_and_another_for_all_later_ones() -> 
     asked: list[tuple[str, int]] = []
 
     class Noting(RandomSelector):
-        def select(self, situation: Situation):  # type: ignore[no-untyped-def]
+        def select(self, situation: Situation) -> Selection:
             asked.append((self.method, len(situation.failed)))
             return super().select(situation)
 

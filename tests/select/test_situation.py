@@ -64,10 +64,7 @@ def test_the_neighbourhood_of_failures_is_as_large_as_leaves_a_start_of_the_grid
     )
     repeated = np.array(
         [
-            any(
-                np.allclose(x0, r.x0) and np.allclose(p_WR, r.p_WR)
-                for r in failed
-            )
+            any(np.allclose(x0, r.x0) and np.allclose(p_WR, r.p_WR) for r in failed)
             for x0, p_WR in zip(*grid, strict=True)
         ]
     )
