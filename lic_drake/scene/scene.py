@@ -59,6 +59,10 @@ class SceneConfig:
     # which it grows, m/s.
     ground_friction_N: float = 2.0
     ground_creep_m_per_s: float = 1e-3
+    # Viscous drag of a floating object, N s/m: 0.1 kg whose velocity halves every 1 ms.
+    drag_N_s_per_m: float = field(default=69.3, metadata={"since": 3})
+    # Density of the skin's sensors, 1/m (paper V-A: 100 in the plane).
+    taxels_per_m: float = field(default=100.0, metadata={"since": 3})
     contact: ContactConfig = field(default_factory=ContactConfig)
 
     def __post_init__(self) -> None:
@@ -78,6 +82,8 @@ class SceneConfig:
             "cenic_max_step_s",
             "ground_friction_N",
             "ground_creep_m_per_s",
+            "drag_N_s_per_m",
+            "taxels_per_m",
         ):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0.0):
