@@ -71,7 +71,9 @@ def make_reach_diagram(
     plant = scene.plant
     plant.set_name("plant")
 
-    sensor = builder.AddNamedSystem("sensor", TactileSensor(arm, layout, scene.skin_links))
+    sensor = builder.AddNamedSystem(
+        "sensor", TactileSensor(arm, layout, scene.skin_links, scene.body)
+    )
     builder.Connect(plant.get_contact_results_output_port(), sensor.GetInputPort("contact_results"))
     builder.Connect(plant.get_state_output_port(scene.arm), sensor.GetInputPort("arm_state"))
 
@@ -85,11 +87,11 @@ def make_reach_diagram(
     builder.ExportInput(controller.GetInputPort("goal"), "goal")
 
     # The movables' actuators are their dry friction: they always want to stand still.
+    at_rest = plant.get_desired_state_input_port(scene.clutter)
     standstill = builder.AddNamedSystem(
-        "standstill",
-        ConstantVectorSource(np.zeros(plant.num_multibody_states(scene.clutter))),
+        "standstill", ConstantVectorSource(np.zeros(at_rest.size()))
     )
-    builder.Connect(standstill.get_output_port(), plant.get_desired_state_input_port(scene.clutter))
+    builder.Connect(standstill.get_output_port(), at_rest)
 
     builder.ExportOutput(plant.get_state_output_port(scene.arm), "arm_state")
     builder.ExportOutput(plant.get_state_output_port(scene.clutter), "clutter_state")

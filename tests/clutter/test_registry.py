@@ -9,8 +9,8 @@ from lic_drake.clutter.aperture import CylinderApertureClutter
 from lic_drake.clutter.cylinder import CylinderClutter
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.clutter.passage import PassageClutter
-from lic_drake.clutter.sphere import SphereApertureClutter
 from lic_drake.clutter.registry import category_names, get_category, register_category
+from lic_drake.clutter.sphere import SphereApertureClutter
 from lic_drake.errors import ScenarioError
 from lic_drake.reach.scenario import parse_scenario
 
