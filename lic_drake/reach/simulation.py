@@ -34,8 +34,9 @@ class Simulation:
         self._base = scene.base
         self._context = reach_diagram.diagram.CreateDefaultContext()
         self._plant_context = scene.plant.GetMyMutableContextFromRoot(self._context)
+        self._num_axes = scene.num_axes
         self._p_WO_first = scene.plant.GetPositions(self._plant_context, scene.clutter).reshape(
-            -1, 2
+            -1, self._num_axes
         )
         self._taxel_force = reach_diagram.diagram.GetOutputPort("taxel_force")
         scene_graph = scene.scene_graph
@@ -84,6 +85,19 @@ class Simulation:
             self._simulator.get_mutable_integrator().request_initial_step_size_target(longest_s)
         self._initialized = False
 
+    def find_free(self, angles: Vector) -> Vector | None:
+        """Returns the first joint angles with which the arm touches nothing, shape (m,), or None.
+
+        Args:
+            angles: Joint angles to try, shape (n, m), radians.
+        """
+        for q in angles:
+            self._plant.SetPositions(self._plant_context, self._arm, q)
+            if not self.is_in_collision():
+                free: Vector = q
+                return free
+        return None
+
     def is_in_collision(self) -> bool:
         """Tells whether the arm touches anything now."""
         scene = self._reach_diagram.scene
@@ -119,8 +133,9 @@ class Simulation:
         return np.asarray(self._taxel_force.Eval(self._context))
 
     def object_positions(self) -> Vector:
-        """Returns p_WO of the movable objects in the plane, shape (n, 2), metres."""
-        return self._plant.GetPositions(self._plant_context, self._clutter).reshape(-1, 2)
+        """Returns p_WO of the movable objects, shape (n, num_axes), metres."""
+        p_WO = self._plant.GetPositions(self._plant_context, self._clutter)
+        return p_WO.reshape(-1, self._num_axes)
 
     def state(self) -> SceneState:
         """Returns the present state of the arm and of the movable objects."""
@@ -128,8 +143,8 @@ class Simulation:
         return SceneState(
             q=plant.GetPositions(context, self._arm),
             v=plant.GetVelocities(context, self._arm),
-            p_WO=plant.GetPositions(context, self._clutter).reshape(-1, 2),
-            v_WO=plant.GetVelocities(context, self._clutter).reshape(-1, 2),
+            p_WO=plant.GetPositions(context, self._clutter).reshape(-1, self._num_axes),
+            v_WO=plant.GetVelocities(context, self._clutter).reshape(-1, self._num_axes),
         )
 
     def set_state(self, state: SceneState) -> None:

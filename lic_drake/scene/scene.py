@@ -103,6 +103,7 @@ class Scene:
         skin_links: Skin geometry -> index into the arm's link names.
         body: Collision geometry of the rest of the robot, which has no skin.
         objects: Collision geometry of each object of the instance.
+        num_axes: In how many directions its movable objects move.
     """
 
     plant: MultibodyPlant
@@ -113,6 +114,7 @@ class Scene:
     skin_links: dict[GeometryId, int]
     body: tuple[GeometryId, ...]
     objects: tuple[GeometryId, ...]
+    num_axes: int
 
 
 def add_scene(
@@ -173,6 +175,7 @@ def add_scene(
         skin_links=skin_links,
         body=_find_body(plant, arm_instance, skin_links),
         objects=tuple(objects),
+        num_axes=instance.num_axes,
     )
 
 
