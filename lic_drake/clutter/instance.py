@@ -65,9 +65,8 @@ class ClutterInstance:
 
     @property
     def num_axes(self) -> int:
-        """In how many directions movable objects move: 2 on the ground, 3 for floating spheres."""
-        shapes = {s for s, moves in zip(self.shape, self.movable, strict=True) if moves}
-        return 3 if shapes == {"sphere"} else 2
+        """In how many directions movable objects move: 2 on the ground, 3 where spheres float."""
+        return 3 if "sphere" in self.shape else 2
 
     def translated(self, offset: NDArray[np.float64]) -> "ClutterInstance":
         """Returns the same environment moved by an offset, shape (3,), metres."""

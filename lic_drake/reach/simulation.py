@@ -1,15 +1,15 @@
 """A reach under way in a diagram: its context, its simulator and what the rollout reads."""
 
 from collections.abc import Iterable
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import CollisionFilterDeclaration, FilterId, GeometrySet, QueryObject
+from pydrake.geometry import CollisionFilterDeclaration, FilterId, GeometrySet
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from lic_drake.reach.diagram import ReachDiagram
 from lic_drake.reach.trace import SceneState
+from lic_drake.scene.collision import is_touching
 from lic_drake.scene.scene import SceneConfig
 
 Vector = NDArray[np.float64]
@@ -100,18 +100,7 @@ class Simulation:
 
     def is_in_collision(self) -> bool:
         """Tells whether the arm touches anything now."""
-        scene = self._reach_diagram.scene
-        query = cast(
-            QueryObject,
-            scene.scene_graph.get_query_output_port().Eval(
-                scene.scene_graph.GetMyContextFromRoot(self._context)
-            ),
-        )
-        # Objects that an earlier reach pushed together touch each other, which does not matter.
-        return bool(query.HasCollisions()) and any(
-            pair.id_A in scene.skin_links or pair.id_B in scene.skin_links
-            for pair in query.ComputePointPairPenetration()
-        )
+        return is_touching(self._reach_diagram.scene, self._context)
 
     def advance_to(self, time_s: float) -> None:
         """Simulates up to a time, not yet with the control update of that instant.
