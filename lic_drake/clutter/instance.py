@@ -63,6 +63,11 @@ class ClutterInstance:
         """Number of objects, fixed and movable."""
         return len(self.shape)
 
+    @property
+    def num_axes(self) -> int:
+        """In how many directions movable objects move: 2 on the ground, 3 where spheres float."""
+        return 3 if "sphere" in self.shape else 2
+
     def translated(self, offset: NDArray[np.float64]) -> "ClutterInstance":
         """Returns the same environment moved by an offset, shape (3,), metres."""
         return replace(
@@ -76,8 +81,9 @@ class ClutterInstance:
         """Returns the environment with its movable objects elsewhere.
 
         Args:
-            p_WO: Their positions in the plane, shape (movable objects, 2), metres.
+            p_WO: Their positions along the axes in which they move, shape (movable objects,
+                num_axes), metres.
         """
         moved = self.p_WO.copy()
-        moved[self.movable, :2] = p_WO
+        moved[self.movable, : self.num_axes] = p_WO
         return replace(self, p_WO=moved)

@@ -1,4 +1,4 @@
-"""Uniform placement of discs in a rectangle without overlap."""
+"""Uniform placement of discs in a rectangle, or of balls in a box, without overlap."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,18 +23,18 @@ def place_discs(
 
     Args:
         rng: Source of the draws.
-        count: Number of discs.
-        lower: Lower corner of the rectangle for the centres, (x, y), metres.
-        upper: Upper corner, (x, y), metres.
+        count: Number of discs, or balls.
+        lower: Lower corner of the rectangle or box for the centres, shape (d,), metres.
+        upper: Upper corner, shape (d,), metres.
         min_distance: Smallest distance between two centres, metres.
 
     Returns:
-        Centres, shape (count, 2), metres.
+        Centres, shape (count, d), metres.
 
     Raises:
         ScenarioError: The discs do not fit.
     """
-    centres = np.empty((count, 2))
+    centres = np.empty((count, len(lower)))
     for i in range(count):
         for _ in range(MAX_TRIES):
             candidate = rng.uniform(lower, upper)
@@ -42,9 +42,9 @@ def place_discs(
                 centres[i] = candidate
                 break
         else:
-            area = np.prod(upper - lower)
+            size = np.prod(upper - lower)
             raise ScenarioError(
-                f"only {i} of {count} objects fit into {area:.3g} m^2 at a distance of"
+                f"only {i} of {count} objects fit into {size:.3g} m^{len(lower)} at a distance of"
                 f" {min_distance:.3g} m; use fewer or smaller objects or a larger region"
             )
     return centres

@@ -8,6 +8,7 @@ from lic_drake.clutter.aperture import CylinderApertureClutter
 from lic_drake.clutter.cylinder import CylinderClutter
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.clutter.passage import PassageClutter
+from lic_drake.clutter.sphere import SphereApertureClutter
 from lic_drake.errors import ScenarioError
 
 
@@ -46,3 +47,4 @@ def category_names() -> tuple[str, ...]:
 register_category("cylinder-clutter", CylinderClutter)
 register_category("passage-clutter", PassageClutter)
 register_category("cylinder-aperture-clutter", CylinderApertureClutter)
+register_category("sphere-aperture-clutter", SphereApertureClutter)

@@ -98,6 +98,8 @@ class HapticMpc:
     def wanted_tip_motion(self, p_EG: Vector) -> Vector:
         """Returns the tip motion of this step towards the goal, shape (3,), metres."""
         distance = math.sqrt(p_EG @ p_EG)
+        if distance < self.config.deadzone_m:
+            return np.zeros(3)
         slow = max(self.config.slow_distance_m, self.config.tip_step_m)
         return p_EG * (self.config.tip_step_m / max(distance, slow))
 

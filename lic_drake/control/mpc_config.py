@@ -1,6 +1,6 @@
-"""Parameters of the quasi-static MPC, with the two published sets of values."""
+"""Parameters of the quasi-static MPC, with the published sets of values."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -13,7 +13,14 @@ _POSITIVE = (
     "tip_step_m",
     "torque_change_weight",
 )
-_FINITE = ("force_trim_N", "slow_distance_m", "position_weight", "force_weight", "force_decrease_N")
+_FINITE = (
+    "force_trim_N",
+    "slow_distance_m",
+    "position_weight",
+    "force_weight",
+    "force_decrease_N",
+    "deadzone_m",
+)
 
 
 @dataclass(kw_only=True)
@@ -57,6 +64,8 @@ class MpcConfig:
     equilibrium_in_limits: bool = True
     # A joint beyond its limit only must not go further (else: must come back in one step).
     forgive_joint_limits: bool = True
+    # The tip is not moved any further where it is nearer to the goal than this, m.
+    deadzone_m: float = field(default=0.0, metadata={"since": 3})
 
     def __post_init__(self) -> None:
         if not 1.0 <= self.rate_hz <= 1000.0:
@@ -104,5 +113,21 @@ def ijrr_2013() -> MpcConfig:
     )
 
 
-PRESETS = {"haptic_mpc_2013": haptic_mpc_2013, "ijrr_2013": ijrr_2013}
+def haptic_mpc_pr2() -> MpcConfig:
+    """Returns the later controller with its values for the PR2 (hrl_haptic_mpc; 3 N, paper V-A)."""
+    return MpcConfig(
+        force_threshold_N=3.0,
+        contact_stiffness_N_per_m=200.0,
+        slow_distance_m=0.25,
+        max_windup_deg=20.0,
+        reset_windup_deg=30.0,
+        deadzone_m=0.01,
+    )
+
+
+PRESETS = {
+    "haptic_mpc_2013": haptic_mpc_2013,
+    "ijrr_2013": ijrr_2013,
+    "pr2": haptic_mpc_pr2,
+}
 """The published parameter sets by name."""

@@ -1,6 +1,6 @@
 """`TactileSensor`: the tactile skin as a Drake system."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import cast
 
 import numpy as np
@@ -12,6 +12,9 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem
 from lic_drake.control.tactile import ContactPatch, calc_taxel_forces
 from lic_drake.control.taxels import TaxelLayout
 from lic_drake.robots.arm import Arm
+
+BODY = -1
+"""Stands for a link where the geometry is the robot's, but has no skin."""
 
 
 class TactileSensor(LeafSystem):
@@ -25,14 +28,28 @@ class TactileSensor(LeafSystem):
         arm_state: [q, v] of the arm, size 2 m, rad and rad/s.
     Output port:
         taxel_force: Normal force on each taxel, size num_taxels, N, compression positive.
+
+    Args:
+        arm: The arm.
+        layout: Its taxels.
+        skin_links: Skin geometry -> index into the arm's link names.
+        body: Geometry of the rest of the robot. Where the arm touches that, or itself, it feels
+            nothing: the controller would take it for an obstacle.
     """
 
-    def __init__(self, arm: Arm, layout: TaxelLayout, skin_links: dict[GeometryId, int]) -> None:
+    def __init__(
+        self,
+        arm: Arm,
+        layout: TaxelLayout,
+        skin_links: dict[GeometryId, int],
+        body: Iterable[GeometryId] = (),
+    ) -> None:
         super().__init__()
         self._arm = arm
         self._layout = layout
         # Numbers: a GeometryId that a plant has returned keeps the whole diagram alive for ever.
         self._skin_links = {geometry.get_value(): link for geometry, link in skin_links.items()}
+        self._skin_links |= {geometry.get_value(): BODY for geometry in body}
         self._contact_results = self.DeclareAbstractInputPort(
             "contact_results", Value(ContactResults())
         )
@@ -69,7 +86,8 @@ def read_patches(
 
     Args:
         results: Contact results of the plant.
-        link_of: Gives the link index of a skin geometry, None for any other geometry.
+        link_of: Gives the link index of a skin geometry, `BODY` for the rest of the robot, None
+            for any other geometry.
     """
     patches = [
         _read_surface(results.hydroelastic_contact_info(i), link_of)
@@ -87,10 +105,8 @@ def _read_surface(
 ) -> ContactPatch | None:
     """Reads a hydroelastic patch; its face normals point out of N, into M."""
     surface = info.contact_surface()
-    link, sign = link_of(surface.id_N()), 1.0
-    if link is None:
-        link, sign = link_of(surface.id_M()), -1.0
-    if link is None:
+    link, sign = _felt(link_of(surface.id_N()), link_of(surface.id_M()))
+    if link == BODY:
         return None
     pressure = surface.poly_e_MN()
     faces = range(surface.num_faces())
@@ -107,10 +123,8 @@ def _read_point(
 ) -> ContactPatch | None:
     """Reads a point contact; Drake reports the force on body B."""
     pair = info.point_pair()
-    link, sign = link_of(pair.id_A), 1.0
-    if link is None:
-        link, sign = link_of(pair.id_B), -1.0
-    if link is None:
+    link, sign = _felt(link_of(pair.id_A), link_of(pair.id_B))
+    if link == BODY:
         return None
     n_R = -sign * np.asarray(pair.nhat_BA_W)
     force = max(0.0, float(sign * n_R @ info.contact_force()))
@@ -120,3 +134,15 @@ def _read_point(
         n_R=n_R[None],
         force=np.array([force]),
     )
+
+
+def _felt(first: int | None, second: int | None) -> tuple[int, float]:
+    """Returns the link that feels a contact, and 1 or -1 for the first or second geometry.
+
+    The link is `BODY` where no skin touches something that is not part of the robot.
+    """
+    if first is None and second is not None:
+        return second, -1.0
+    if second is None and first is not None:
+        return first, 1.0
+    return BODY, 0.0

@@ -20,7 +20,7 @@ from lic_drake.errors import LibraryError
 from lic_drake.reach.request import ReachRecord
 from lic_drake.reach.scenario import Scenario, to_dict
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 """Grows with every change of the columns or the metadata. Columns that came later than version 1
 say so (`since`) and have the default that older tables are read with."""
 

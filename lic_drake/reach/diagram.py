@@ -11,8 +11,8 @@ from pydrake.systems.primitives import ConstantVectorSource
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.control.mpc_controller import HapticMpcController
+from lic_drake.control.surface_taxels import make_taxels
 from lic_drake.control.tactile_sensor import TactileSensor
-from lic_drake.control.taxels import planar_taxels
 from lic_drake.reach.scenario import Scenario
 from lic_drake.scene.scene import Scene, add_scene
 
@@ -48,6 +48,7 @@ def make_reach_diagram(
     instance: ClutterInstance,
     meshcat: Meshcat | None = None,
     base_slides: bool = False,
+    torso_m: float | None = None,
 ) -> ReachDiagram:
     """Builds the diagram of one environment.
 
@@ -56,10 +57,11 @@ def make_reach_diagram(
         instance: The clutter.
         meshcat: Where to draw the scene and its contact forces, if anywhere.
         base_slides: Whether the base can be moved, for drawings; see `add_scene`.
+        torso_m: Height of the robot's torso, metres; by default as the scenario's task has it.
     """
     builder = DiagramBuilder()
-    arm = scenario.arm()
-    layout = planar_taxels(arm.skin)
+    arm = scenario.arm(torso_m)
+    layout = make_taxels(arm, scenario.scene.taxels_per_m)
     scene = add_scene(
         builder,
         arm,
@@ -71,7 +73,9 @@ def make_reach_diagram(
     plant = scene.plant
     plant.set_name("plant")
 
-    sensor = builder.AddNamedSystem("sensor", TactileSensor(arm, layout, scene.skin_links))
+    sensor = builder.AddNamedSystem(
+        "sensor", TactileSensor(arm, layout, scene.skin_links, scene.body)
+    )
     builder.Connect(plant.get_contact_results_output_port(), sensor.GetInputPort("contact_results"))
     builder.Connect(plant.get_state_output_port(scene.arm), sensor.GetInputPort("arm_state"))
 
@@ -85,11 +89,11 @@ def make_reach_diagram(
     builder.ExportInput(controller.GetInputPort("goal"), "goal")
 
     # The movables' actuators are their dry friction: they always want to stand still.
+    at_rest = plant.get_desired_state_input_port(scene.clutter)
     standstill = builder.AddNamedSystem(
-        "standstill",
-        ConstantVectorSource(np.zeros(plant.num_multibody_states(scene.clutter))),
+        "standstill", ConstantVectorSource(np.zeros(at_rest.size()))
     )
-    builder.Connect(standstill.get_output_port(), plant.get_desired_state_input_port(scene.clutter))
+    builder.Connect(standstill.get_output_port(), at_rest)
 
     builder.ExportOutput(plant.get_state_output_port(scene.arm), "arm_state")
     builder.ExportOutput(plant.get_state_output_port(scene.clutter), "clutter_state")

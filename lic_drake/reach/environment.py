@@ -14,6 +14,7 @@ from lic_drake.reach.simulation import Simulation
 from lic_drake.reach.stop_rules import StopMonitor
 from lic_drake.reach.trace import ReachResult, ReachTrace
 from lic_drake.reach.waking import WakingSimulation
+from lic_drake.robots.arm import Arm
 from lic_drake.scene.sleep import MovedTooFarError, can_sleep
 
 Vector = NDArray[np.float64]
@@ -28,6 +29,7 @@ class Environment:
         sleep: Whether objects may sleep until the arm comes near; without, a reach costs three
             times as much and ends the same.
         p_WR: Where the mobile base stands, shape (3,), metres; by default at the origin.
+        torso_m: Height of the robot's torso, metres; by default as the scenario's task has it.
 
     A base that reaches stands still, so the arm is always welded to the origin of the simulated
     world and the environment is moved into the robot's frame R instead (T_b0 of paper Eq. 3).
@@ -39,19 +41,24 @@ class Environment:
         instance: ClutterInstance,
         sleep: bool = True,
         p_WR: Vector | None = None,
+        torso_m: float | None = None,
     ) -> None:
         self.scenario = scenario
         self.instance = instance
-        self.arm = scenario.arm()
+        self.arm = scenario.arm(torso_m)
+        self._torso_m = torso_m
         self.p_WR = np.zeros(3) if p_WR is None else p_WR
         self._in_R = instance.translated(-self.p_WR)
         self._whole: Simulation | None = None
         self._waking: WakingSimulation | None = None
         if sleep and can_sleep(instance):
-            self._waking = WakingSimulation(scenario, self._in_R)
+            self._waking = WakingSimulation(scenario, self._in_R, torso_m)
 
     def reach(self, p_WG: Vector, x0: Vector, keep_states: bool = False) -> ReachResult:
         """Simulates a reach.
+
+        A redundant arm starts in the first of its configurations for the start pose, in the arm's
+        order of preference, in which it touches nothing (paper III-E).
 
         Args:
             p_WG: Goal, shape (3,), metres.
@@ -62,28 +69,39 @@ class Environment:
             How it ended. A goal out of the arm's reach is known to fail without simulating it.
         """
         p_RG = p_WG - self.p_WR
-        if not is_within_reach(self.scenario, p_RG):
+        if not is_within_reach(self.scenario, p_RG, self._torso_m):
             return ReachResult("unreachable", ReachTrace(), "the goal is beyond the arm's reach")
-        q0 = self.arm.solve_ik(x0 - [*self.p_WR[:2], 0.0])
-        if q0 is None:
+        x0_R = x0.copy()
+        x0_R[:2] -= self.p_WR[:2]
+        angles = self.arm.start_angles(x0_R)
+        if not len(angles):
             return ReachResult(
                 "invalid_start", ReachTrace(), "no configuration within the joint limits"
             )
-        result = self._simulate(q0, p_RG, keep_states)
+        result = self._simulate(angles, p_RG, keep_states)
         result.trace.translate(self.p_WR)
         return result
 
-    def _simulate(self, q0: Vector, p_RG: Vector, keep_states: bool) -> ReachResult:
+    def _simulate(self, angles: Vector, p_RG: Vector, keep_states: bool) -> ReachResult:
         if self._waking is not None:
             # Where something moved too far at once, the reach is repeated with all objects awake.
             with suppress(MovedTooFarError):
-                return self._simulate_in(self._waking, q0, p_RG, keep_states)
-        return self._simulate_in(self._all_awake(), q0, p_RG, keep_states)
+                return self._simulate_in(self._waking, angles, p_RG, keep_states)
+        return self._simulate_in(self._all_awake(), angles, p_RG, keep_states)
 
     def _simulate_in(
-        self, simulation: Simulation | WakingSimulation, q0: Vector, p_RG: Vector, keep_states: bool
+        self,
+        simulation: Simulation | WakingSimulation,
+        angles: Vector,
+        p_RG: Vector,
+        keep_states: bool,
     ) -> ReachResult:
-        result = simulate(simulation, self.scenario, q0, p_RG, keep_states)
+        q0 = angles[0]
+        if len(angles) > 1:
+            simulation.begin(q0, p_RG)
+            free = simulation.find_free(angles)
+            q0 = q0 if free is None else free
+        result = simulate(simulation, self.scenario, q0, p_RG, keep_states, self.arm)
         if result.trace.q:
             p_WO = simulation.state().p_WO
             result.trace.p_WO = p_WO if np.all(np.isfinite(p_WO)) else None
@@ -92,7 +110,7 @@ class Environment:
     def _all_awake(self) -> Simulation:
         """Returns the simulation in which nothing sleeps, built when it is first needed."""
         if self._whole is None:
-            diagram = make_reach_diagram(self.scenario, self._in_R)
+            diagram = make_reach_diagram(self.scenario, self._in_R, torso_m=self._torso_m)
             self._whole = Simulation(diagram, self.scenario.scene)
         return self._whole
 
@@ -103,6 +121,7 @@ def simulate(
     q0: Vector,
     p_WG: Vector,
     keep_states: bool = False,
+    arm: Arm | None = None,
 ) -> ReachResult:
     """Runs a simulation from rest at q0 until a stop rule ends it; the base is at the origin.
 
@@ -112,11 +131,12 @@ def simulate(
         q0: First joint angles, shape (m,), radians.
         p_WG: Goal, shape (3,), metres.
         keep_states: Whether the trace is to hold the whole scene.
+        arm: The arm; by default as the scenario's task has it.
 
     Raises:
         MovedTooFarError: The simulation must be repeated with every object awake.
     """
-    arm = scenario.arm()
+    arm = scenario.arm() if arm is None else arm
     period_s = scenario.mpc.period_s
     simulation.begin(q0, p_WG)
     if simulation.is_in_collision():

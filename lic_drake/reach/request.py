@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lic_drake.errors import RequestError
 from lic_drake.reach.scenario import Scenario
+from lic_drake.robots.arm import Arm
 
 OUTCOMES = ("reached", "stuck", "force", "timeout", "diverged", "invalid_start", "unreachable")
 """How a reach can end: at the goal; without progress; by the force stop; out of time; by a
@@ -17,16 +18,27 @@ failure of the simulator; before it began, because the arm cannot stand at the s
 the goal is further away than the arm is long."""
 
 
+IN_SPACE = 7
+"""Length of a start pose in space; one in the plane has 3 numbers."""
+
+
 class EarlierReach(NamedTuple):
     """A reach to the same goal that went before and left the environment as it is found.
 
     Attributes:
-        start: Hand pose x0 that it began with, in W; in the plane (x, y, phi), metres and radians.
+        start: Hand pose x0 that it began with, in W; in the plane (x, y, phi), metres and radians,
+            in space position and quaternion (x, y, z, qw, qx, qy, qz).
         base: p_WR in the plane, (x, y), metres.
+        torso: Height of the robot's torso, metres; 0 for a robot without one.
     """
 
-    start: tuple[float, float, float]
+    start: tuple[float, ...]
     base: tuple[float, float]
+    torso: float = 0.0
+
+    def flat(self) -> tuple[float, ...]:
+        """Returns its numbers one after the other; the torso only where there may be one."""
+        return (*self.start, *self.base, *((self.torso,) if len(self.start) == IN_SPACE else ()))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,8 +50,10 @@ class ReachRequest:
         stream: Seed stream of the environment, one of `lic_drake.seeds.STREAMS`.
         environment: Index of the environment in its stream.
         goal: p_WG, (x, y, z), metres.
-        start: Hand pose x0 in W; in the plane (x, y, phi), metres and radians.
+        start: Hand pose x0 in W; in the plane (x, y, phi), metres and radians, in space position
+            and quaternion (x, y, z, qw, qx, qy, qz).
         base: Where the mobile base stands during the reach, p_WR in the plane, (x, y), metres.
+        torso: Height of the robot's torso, metres; 0 for a robot without one.
         after: Reaches to the same goal that went before, in their order; without any the
             environment is as it was drawn.
     """
@@ -48,17 +62,21 @@ class ReachRequest:
     stream: str
     environment: int
     goal: tuple[float, float, float]
-    start: tuple[float, float, float]
+    start: tuple[float, ...]
     base: tuple[float, float] = (0.0, 0.0)
+    torso: float = 0.0
     after: tuple[EarlierReach, ...] = ()
 
     @property
     def key(self) -> str:
         """Identifies the request in a library: 16 hexadecimal digits."""
-        content = [self.scenario.digest, self.stream, self.environment, self.goal, self.start]
+        content: list[object] = [self.scenario.digest, self.stream, self.environment]
+        content += [self.goal, self.start]
         # Left out where they are as in libraries from before there were any.
         if self.base != (0.0, 0.0) or self.after:
-            content += [self.base, self.after]
+            content += [self.base, [(earlier.start, earlier.base) for earlier in self.after]]
+        if len(self.start) == IN_SPACE:
+            content += [self.torso, [earlier.torso for earlier in self.after]]
         return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
 
     @property
@@ -71,17 +89,28 @@ class ReachRequest:
         if not self.after:
             return None
         last = self.after[-1]
-        return replace(self, start=last.start, base=last.base, after=self.after[:-1])
+        return replace(
+            self, start=last.start, base=last.base, torso=last.torso, after=self.after[:-1]
+        )
 
-    def then(self, x0: NDArray[np.float64], p_WR: NDArray[np.float64]) -> "ReachRequest":
+    def then(
+        self, x0: NDArray[np.float64], p_WR: NDArray[np.float64], torso_m: float | None = None
+    ) -> "ReachRequest":
         """Returns the request of a further reach to the same goal.
 
         Args:
-            x0: Its start pose, shape (3,).
+            x0: Its start pose, shape (3,), or (7,) in space.
             p_WR: Its base, shape (2,) or (3,), metres.
+            torso_m: Its torso's height, metres; by default the present one.
         """
-        earlier = EarlierReach(start=self.start, base=self.base)
-        return replace(self, start=_triple(x0), base=_pair(p_WR), after=(*self.after, earlier))
+        earlier = EarlierReach(start=self.start, base=self.base, torso=self.torso)
+        return replace(
+            self,
+            start=_numbers(x0),
+            base=_pair(p_WR),
+            torso=self.torso if torso_m is None else torso_m,
+            after=(*self.after, earlier),
+        )
 
 
 def make_request(
@@ -91,6 +120,7 @@ def make_request(
     p_WG: NDArray[np.float64],
     x0: NDArray[np.float64],
     p_WR: NDArray[np.float64] | None = None,
+    torso_m: float | None = None,
 ) -> ReachRequest:
     """Returns the request of a first reach from arrays.
 
@@ -99,17 +129,23 @@ def make_request(
         stream: Seed stream of the environment.
         environment: Its index.
         p_WG: Goal, shape (3,), metres.
-        x0: Start pose, shape (3,).
+        x0: Start pose, shape (3,), or (7,) in space.
         p_WR: Base, shape (2,) or (3,), metres; by default at the origin.
+        torso_m: Height of the torso, metres; by default as the scenario's task has it.
     """
     return ReachRequest(
         scenario=scenario,
         stream=stream,
         environment=environment,
         goal=_triple(p_WG),
-        start=_triple(x0),
+        start=_numbers(x0),
         base=(0.0, 0.0) if p_WR is None else _pair(p_WR),
+        torso=scenario.task.torso_m if torso_m is None else torso_m,
     )
+
+
+def _numbers(values: NDArray[np.float64]) -> tuple[float, ...]:
+    return tuple(np.asarray(values, dtype=float).tolist())
 
 
 def _triple(values: NDArray[np.float64]) -> tuple[float, float, float]:
@@ -119,6 +155,12 @@ def _triple(values: NDArray[np.float64]) -> tuple[float, float, float]:
 def _pair(values: NDArray[np.float64]) -> tuple[float, float]:
     # Adding zero makes -0.0 and 0.0 the same base with the same key.
     return float(values[0]) + 0.0, float(values[1]) + 0.0
+
+
+def _later(unit: str, doc: str) -> float:
+    """Returns a column of schema version 3; 0 in the plane and in tables from before it."""
+    column: float = field(default=0.0, metadata={"unit": unit, "doc": doc, "since": 3})
+    return column
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -173,10 +215,28 @@ class ReachRecord:
         default=(),
         metadata={
             "unit": "m, m, rad, m, m",
-            "doc": "x0 and p_WR of each reach that went before",
+            "doc": "x0, p_WR and, in space, torso of each reach that went before",
             "since": 2,
         },
     )
+    torso: float = _later("m", "height of the torso")
+    start_z: float = _later("m", "start pose x0")
+    start_qw: float = _later("", "start pose x0, quaternion; all 0 in the plane")
+    start_qx: float = _later("", "start pose x0, quaternion")
+    start_qy: float = _later("", "start pose x0, quaternion")
+    start_qz: float = _later("", "start pose x0, quaternion")
+    final_z: float = _later("m", "final hand pose x_inf")
+    final_qw: float = _later("", "final hand pose x_inf, quaternion; all 0 in the plane")
+    final_qx: float = _later("", "final hand pose x_inf, quaternion")
+    final_qy: float = _later("", "final hand pose x_inf, quaternion")
+    final_qz: float = _later("", "final hand pose x_inf, quaternion")
+    final_vz: float = _later("m/s", "mean tip velocity of the last second of motion")
+
+    @property
+    def in_space(self) -> bool:
+        """Whether the poses have a quaternion, so that the angles phi mean nothing (they are 0)."""
+        quaternion = (self.start_qw, self.start_qx, self.start_qy, self.start_qz)
+        return quaternion != (0.0, 0.0, 0.0, 0.0)
 
     @property
     def p_WG(self) -> NDArray[np.float64]:
@@ -185,21 +245,27 @@ class ReachRecord:
 
     @property
     def x0(self) -> NDArray[np.float64]:
-        """The start pose (x, y, phi), metres and radians."""
-        return np.array([self.start_x, self.start_y, self.start_phi])
+        """The start pose: (x, y, phi), or position and quaternion in space, as in the request."""
+        if not self.in_space:
+            return np.array([self.start_x, self.start_y, self.start_phi])
+        quaternion = (self.start_qw, self.start_qx, self.start_qy, self.start_qz)
+        return np.array([self.start_x, self.start_y, self.start_z, *quaternion])
 
 
 def request_of(record: ReachRecord, scenario: Scenario) -> ReachRequest:
     """Returns the request that a record answers; `scenario` is the one that it was made with."""
-    after = np.array(record.after).reshape(-1, 5)
+    n = len(record.x0)
+    width = n + (3 if record.in_space else 2)
+    rows = [record.after[i : i + width] for i in range(0, len(record.after), width)]
     return ReachRequest(
         scenario=scenario,
         stream=record.stream,
         environment=record.environment,
         goal=_triple(record.p_WG),
-        start=_triple(record.x0),
+        start=_numbers(record.x0),
         base=(record.base_x, record.base_y),
-        after=tuple(EarlierReach(start=_triple(row[:3]), base=_pair(row[3:])) for row in after),
+        torso=record.torso,
+        after=tuple(EarlierReach(row[:n], (row[n], row[n + 1]), *row[n + 2 :]) for row in rows),
     )
 
 
@@ -212,16 +278,27 @@ def check_goal(scenario: Scenario, p_WG: NDArray[np.float64]) -> None:
     if p_WG.shape != (3,) or not np.all(np.isfinite(p_WG)):
         raise RequestError(f"a goal is two finite numbers in metres, got {p_WG.tolist()}")
     if not is_within_reach(scenario, p_WG):
+        distance = np.linalg.norm(p_WG - scenario.arm().p_RS)
         raise RequestError(
-            f"the goal ({p_WG[0]:g}, {p_WG[1]:g}) m is {np.linalg.norm(p_WG):.3f} m from the base"
-            f" and the arm reaches {_farthest_goal_m(scenario):.3f} m; choose a nearer goal"
+            f"the goal ({p_WG[0]:g}, {p_WG[1]:g}) m is {distance:.3f} m from the base"
+            f" and the arm reaches {_farthest_goal_m(scenario.arm(), scenario):.3f} m; choose a"
+            " nearer goal"
         )
 
 
-def is_within_reach(scenario: Scenario, p_WG: NDArray[np.float64]) -> bool:
-    """Tells whether the straight arm could come near enough to a goal, shape (3,), to succeed."""
-    return float(np.linalg.norm(p_WG)) < _farthest_goal_m(scenario)
+def is_within_reach(
+    scenario: Scenario, p_RG: NDArray[np.float64], torso_m: float | None = None
+) -> bool:
+    """Tells whether the straight arm could come near enough to a goal to succeed.
+
+    Args:
+        scenario: Robot and success distance.
+        p_RG: The goal, shape (3,), metres.
+        torso_m: Height of the torso, metres; by default as the scenario's task has it.
+    """
+    arm = scenario.arm(torso_m)
+    return float(np.linalg.norm(p_RG - arm.p_RS)) < _farthest_goal_m(arm, scenario)
 
 
-def _farthest_goal_m(scenario: Scenario) -> float:
-    return scenario.arm().reach_m + scenario.stop.success_distance_m
+def _farthest_goal_m(arm: Arm, scenario: Scenario) -> float:
+    return arm.reach_m + scenario.stop.success_distance_m

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import lic_drake
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.reach.environment import Environment
-from lic_drake.reach.request import ReachRecord, ReachRequest
+from lic_drake.reach.request import IN_SPACE, ReachRecord, ReachRequest
 from lic_drake.reach.trace import ReachResult
 
 Vector = NDArray[np.float64]
@@ -33,7 +33,7 @@ def environment_of(request: ReachRequest, sleep: bool = True) -> Environment:
     Diagrams of the last few requests of the same drawn environment are kept in this process.
     """
     drawn = (request.scenario.digest, request.stream, request.environment, sleep)
-    key = (*drawn, request.base, request.after)
+    key = (*drawn, request.base, request.torso, request.after)
     if key not in _environments:
         known = next(iter(_environments), drawn)
         if len(_environments) >= MAX_ENVIRONMENTS or known[: len(drawn)] != drawn:
@@ -41,7 +41,11 @@ def environment_of(request: ReachRequest, sleep: bool = True) -> Environment:
             # Diagrams with Python systems are reference cycles: only the collector frees them.
             gc.collect()
         _environments[key] = Environment(
-            request.scenario, instance_of(request), sleep, p_WR=request.p_WR
+            request.scenario,
+            instance_of(request),
+            sleep,
+            p_WR=request.p_WR,
+            torso_m=request.torso,
         )
     return _environments[key]
 
@@ -75,7 +79,7 @@ def remember_end(request: ReachRequest, result: ReachResult) -> None:
     p_WO = result.trace.p_WO
     if p_WO is None:  # It never began, or the simulator failed: nothing is known to have moved.
         instance = environment_of(request).instance
-        p_WO = instance.p_WO[instance.movable, :2]
+        p_WO = instance.p_WO[instance.movable, : instance.num_axes]
     _ends[request.key] = p_WO
 
 
@@ -100,7 +104,11 @@ def make_record(request: ReachRequest, result: ReachResult, wall_time_s: float) 
     outcome, trace, detail = result
     scenario = request.scenario
     nothing = not trace.q
-    final = np.full(3, np.nan) if nothing else scenario.arm().tip_pose(trace.q[-1])
+    start = np.array(request.start)
+    if nothing:
+        final = np.full(len(start), np.nan)
+    else:
+        final = scenario.arm(request.torso).tip_pose(trace.q[-1])
     final[:2] += request.base
     still_s = scenario.stop.stuck_time_s if outcome == "stuck" else 0.0
     velocity = np.full(3, np.nan) if nothing else trace.final_velocity(still_s)
@@ -115,14 +123,8 @@ def make_record(request: ReachRequest, result: ReachResult, wall_time_s: float) 
         goal_x=request.goal[0],
         goal_y=request.goal[1],
         goal_z=request.goal[2],
-        start_x=request.start[0],
-        start_y=request.start[1],
-        start_phi=request.start[2],
         outcome=outcome,
         success=outcome == "reached",
-        final_x=float(final[0]),
-        final_y=float(final[1]),
-        final_phi=float(final[2]),
         final_vx=float(velocity[0]),
         final_vy=float(velocity[1]),
         min_distance=math.nan if nothing else float(distances.min()),
@@ -139,8 +141,22 @@ def make_record(request: ReachRequest, result: ReachResult, wall_time_s: float) 
         drake_version=_drake_version(),
         base_x=request.base[0],
         base_y=request.base[1],
-        after=tuple(x for earlier in request.after for x in (*earlier.start, *earlier.base)),
+        after=tuple(x for earlier in request.after for x in earlier.flat()),
+        torso=request.torso,
+        final_vz=float(velocity[2]) if len(start) == IN_SPACE else 0.0,
+        **_pose_columns("start", start),
+        **_pose_columns("final", final),
     )
+
+
+def _pose_columns(name: str, x: Vector) -> dict[str, float]:
+    """Returns the columns of a hand pose, (x, y, phi) or position and quaternion."""
+    if len(x) != IN_SPACE:
+        axes: tuple[str, ...] = ("x", "y", "phi")
+        return {f"{name}_{axis}": float(value) for axis, value in zip(axes, x, strict=True)}
+    axes = ("x", "y", "z", "qw", "qx", "qy", "qz")
+    columns = {f"{name}_{axis}": float(value) for axis, value in zip(axes, x, strict=True)}
+    return {**columns, f"{name}_phi": 0.0}
 
 
 @cache

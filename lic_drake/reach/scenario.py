@@ -48,9 +48,16 @@ class Scenario:
         values = json.dumps(_identity(self), sort_keys=True, default=repr)
         return hashlib.sha256(values.encode()).hexdigest()[:12]
 
-    def arm(self) -> Arm:
-        """Returns the robot."""
-        return get_robot(self.robot)
+    def arm(self, torso_m: float | None = None) -> Arm:
+        """Returns the robot.
+
+        Args:
+            torso_m: Height of its torso, metres; by default as the task has it.
+
+        Raises:
+            ScenarioError: The torso cannot go there.
+        """
+        return get_robot(self.robot).raised(self.task.torso_m if torso_m is None else torso_m)
 
     def sample_instance(self, stream: str, environment: int) -> ClutterInstance:
         """Draws the environment with this index in a seed stream."""
@@ -166,6 +173,7 @@ def parse_scenario(content: str, overrides: str = "", source: str = "scenario") 
         mpc=_typed(MpcConfig, mpc, f"{source}: mpc", defaults=PRESETS[preset]()),
         stop=_typed(StopConfig, data.get("stop"), f"{source}: stop"),
     )
+    scenario.arm()  # Refuses a torso out of its range.
     if scenario.task.goal_area is None and len(scenario.goals("training", 0)) == 0:
         raise ScenarioError(
             f"{source}: task: goal_area cannot be null, because an environment of"

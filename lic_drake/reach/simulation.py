@@ -1,15 +1,15 @@
 """A reach under way in a diagram: its context, its simulator and what the rollout reads."""
 
 from collections.abc import Iterable
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import CollisionFilterDeclaration, FilterId, GeometrySet, QueryObject
+from pydrake.geometry import CollisionFilterDeclaration, FilterId, GeometrySet
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from lic_drake.reach.diagram import ReachDiagram
 from lic_drake.reach.trace import SceneState
+from lic_drake.scene.collision import is_touching
 from lic_drake.scene.scene import SceneConfig
 
 Vector = NDArray[np.float64]
@@ -34,8 +34,9 @@ class Simulation:
         self._base = scene.base
         self._context = reach_diagram.diagram.CreateDefaultContext()
         self._plant_context = scene.plant.GetMyMutableContextFromRoot(self._context)
+        self._num_axes = scene.num_axes
         self._p_WO_first = scene.plant.GetPositions(self._plant_context, scene.clutter).reshape(
-            -1, 2
+            -1, self._num_axes
         )
         self._taxel_force = reach_diagram.diagram.GetOutputPort("taxel_force")
         scene_graph = scene.scene_graph
@@ -84,20 +85,22 @@ class Simulation:
             self._simulator.get_mutable_integrator().request_initial_step_size_target(longest_s)
         self._initialized = False
 
+    def find_free(self, angles: Vector) -> Vector | None:
+        """Returns the first joint angles with which the arm touches nothing, shape (m,), or None.
+
+        Args:
+            angles: Joint angles to try, shape (n, m), radians.
+        """
+        for q in angles:
+            self._plant.SetPositions(self._plant_context, self._arm, q)
+            if not self.is_in_collision():
+                free: Vector = q
+                return free
+        return None
+
     def is_in_collision(self) -> bool:
         """Tells whether the arm touches anything now."""
-        scene = self._reach_diagram.scene
-        query = cast(
-            QueryObject,
-            scene.scene_graph.get_query_output_port().Eval(
-                scene.scene_graph.GetMyContextFromRoot(self._context)
-            ),
-        )
-        # Objects that an earlier reach pushed together touch each other, which does not matter.
-        return bool(query.HasCollisions()) and any(
-            pair.id_A in scene.skin_links or pair.id_B in scene.skin_links
-            for pair in query.ComputePointPairPenetration()
-        )
+        return is_touching(self._reach_diagram.scene, self._context)
 
     def advance_to(self, time_s: float) -> None:
         """Simulates up to a time, not yet with the control update of that instant.
@@ -119,8 +122,9 @@ class Simulation:
         return np.asarray(self._taxel_force.Eval(self._context))
 
     def object_positions(self) -> Vector:
-        """Returns p_WO of the movable objects in the plane, shape (n, 2), metres."""
-        return self._plant.GetPositions(self._plant_context, self._clutter).reshape(-1, 2)
+        """Returns p_WO of the movable objects, shape (n, num_axes), metres."""
+        p_WO = self._plant.GetPositions(self._plant_context, self._clutter)
+        return p_WO.reshape(-1, self._num_axes)
 
     def state(self) -> SceneState:
         """Returns the present state of the arm and of the movable objects."""
@@ -128,8 +132,8 @@ class Simulation:
         return SceneState(
             q=plant.GetPositions(context, self._arm),
             v=plant.GetVelocities(context, self._arm),
-            p_WO=plant.GetPositions(context, self._clutter).reshape(-1, 2),
-            v_WO=plant.GetVelocities(context, self._clutter).reshape(-1, 2),
+            p_WO=plant.GetPositions(context, self._clutter).reshape(-1, self._num_axes),
+            v_WO=plant.GetVelocities(context, self._clutter).reshape(-1, self._num_axes),
         )
 
     def set_state(self, state: SceneState) -> None:

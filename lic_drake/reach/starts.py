@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import RequestError
 from lic_drake.reach.hand_poses import HandPoses, Vector
+from lic_drake.reach.pointing_starts import find_pointing_starts
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.task import BaseTrack, StartLine
+from lic_drake.robots.pr2 import Pr2Arm
 from lic_drake.robots.registry import get_robot
 from lic_drake.seeds import make_generator
 
@@ -24,7 +26,8 @@ class InitialConditions(NamedTuple):
     """n initial conditions.
 
     Attributes:
-        x0: Hand poses (x, y, phi) in W, shape (n, 3), metres and radians.
+        x0: Hand poses (x, y, phi) in W, shape (n, 3), metres and radians; in space position and
+            quaternion, shape (n, 7).
         p_WR: Positions of the base in the plane, shape (n, 2), metres.
     """
 
@@ -223,9 +226,13 @@ def make_starts(scenario: Scenario, instance: ClutterInstance) -> LineStarts | A
 def training_starts(scenario: Scenario, stream: str, environment: int) -> InitialConditions:
     """Returns the initial conditions that a collection tries in an environment.
 
-    They are the grid of a fixed base (paper IV-A), and random ones at each aperture for a mobile
-    base, whose grid would be far larger than the paper's 15 reaches an environment.
+    They are one for each aperture for a robot in space (paper IV-B), the grid of a fixed base
+    (paper IV-A), and random ones at each aperture for a mobile base, whose grid would be far larger
+    than the paper's 15 reaches an environment.
     """
+    if isinstance(scenario.arm(), Pr2Arm):
+        pointing = find_pointing_starts(scenario, scenario.sample_instance(stream, environment))
+        return InitialConditions(pointing.x0, np.tile(pointing.p_WR, (len(pointing.x0), 1)))
     if scenario.task.base is None:
         return LineStarts(poses=_poses(scenario)).grid
     starts = make_starts(scenario, scenario.sample_instance(stream, environment))

@@ -60,9 +60,12 @@ class StartLine:
 
 @dataclass(kw_only=True)
 class GoalArea:
-    """Rectangle of goals p_WG with its training grid (paper: 0.4 x 0.8 m, 5 x 9 at 0.1 m)."""
+    """Rectangle of goals p_WG with its training grid (paper: 0.4 x 0.8 m, 5 x 9 at 0.1 m).
 
-    # Corners (x, y) in W and grid distance, metres.
+    In space it may be a box or an upright rectangle (paper: 0.6 x 0.4 m, 4 x 3 at 0.2 m).
+    """
+
+    # Corners (x, y) or (x, y, z) in W and grid distance, metres.
     lower: list[float] = field(default_factory=lambda: [0.45, -0.4])
     upper: list[float] = field(default_factory=lambda: [0.85, 0.4])
     step_m: float = 0.1
@@ -70,22 +73,28 @@ class GoalArea:
     random_goals: int = field(default=0, metadata={"since": 2})
 
     def __post_init__(self) -> None:
-        if len(self.lower) != 2 or len(self.upper) != 2:
-            raise ScenarioError(f"goal area corners must be [x, y], got {self.lower}, {self.upper}")
-        for name, low, high in zip("xy", self.lower, self.upper, strict=True):
+        if len(self.lower) != len(self.upper) or len(self.lower) not in (2, 3):
+            raise ScenarioError(
+                "goal area corners must be [x, y], or [x, y, z] for a robot in space, got"
+                f" {self.lower}, {self.upper}"
+            )
+        for name, low, high in zip("xyz", self.lower, self.upper, strict=False):
             _check_range(f"goal area {name}", low, high, self.step_m)
         if self.random_goals < 0:
             raise ScenarioError(f"random_goals must be 0 or more, got {self.random_goals}")
 
     def grid(self) -> Vector:
         """Returns the grid goals, shape (n, 3), metres; x varies slowest."""
-        x = _steps(self.lower[0], self.upper[0], self.step_m)
-        y = _steps(self.lower[1], self.upper[1], self.step_m)
-        return np.array([[xi, yi, 0.0] for xi in x for yi in y])
+        x, y, *heights = (
+            _steps(low, high, self.step_m) for low, high in zip(self.lower, self.upper, strict=True)
+        )
+        z = heights[0] if heights else np.zeros(1)
+        return np.array([[xi, yi, zi] for xi in x for yi in y for zi in z])
 
     def sample(self, rng: np.random.Generator) -> Vector:
         """Draws a goal p_WG uniformly, shape (3,), metres."""
-        return np.append(rng.uniform(self.lower, self.upper), 0.0)
+        p_WG = rng.uniform(self.lower, self.upper)
+        return np.append(p_WG, np.zeros(3 - len(p_WG)))
 
 
 @dataclass(kw_only=True)
@@ -117,6 +126,8 @@ class Task:
     start_line: StartLine = field(default_factory=StartLine)
     # None: the base is fixed at the origin.
     base: BaseTrack | None = field(default=None, metadata={"since": 2})
+    # Height of the robot's torso lift, metres; 0 for a robot without one.
+    torso_m: float = field(default=0.0, metadata={"since": 3})
     # None: the goal is the one that each environment offers (passage-clutter).
     goal_area: GoalArea | None = field(default_factory=GoalArea)
 

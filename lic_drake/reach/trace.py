@@ -15,8 +15,9 @@ class SceneState(NamedTuple):
     Attributes:
         q: Joint angles, shape (m,), radians.
         v: Joint velocities, shape (m,), rad/s.
-        p_WO: Positions of the movable objects in the plane, shape (n, 2), metres.
-        v_WO: Their velocities, shape (n, 2), m/s.
+        p_WO: Positions of the movable objects along the axes in which they move, shape (n, 2) in
+            the plane and (n, 3) in space, metres.
+        v_WO: Their velocities, of the same shape, m/s.
     """
 
     q: Vector
@@ -38,8 +39,8 @@ class ReachTrace:
         contacts: Number of loaded taxels.
         states: The state of the scene at each sample, if it was asked for.
         p_WR: Position of the arm's base, shape (3,), metres.
-        p_WO: Positions of the movable objects in the plane when the reach ended, shape (n, 2),
-            metres; None where it never began or they are not finite.
+        p_WO: Positions of the movable objects when the reach ended, shape (n, 2) or (n, 3), metres;
+            None where it never began or they are not finite.
     """
 
     time_s: list[float] = field(default_factory=list)
@@ -64,10 +65,10 @@ class ReachTrace:
     def translate(self, offset: Vector) -> None:
         """Moves all positions by an offset, shape (3,), metres."""
         self.p_WE = [p_WE + offset for p_WE in self.p_WE]
-        self.states = [s._replace(p_WO=s.p_WO + offset[:2]) for s in self.states]
+        self.states = [s._replace(p_WO=s.p_WO + offset[: s.p_WO.shape[1]]) for s in self.states]
         self.p_WR = self.p_WR + offset
         if self.p_WO is not None:
-            self.p_WO = self.p_WO + offset[:2]
+            self.p_WO = self.p_WO + offset[: self.p_WO.shape[1]]
 
     @property
     def mean_force(self) -> float:

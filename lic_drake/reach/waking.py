@@ -23,10 +23,13 @@ class WakingSimulation:
     When the spares do not suffice, the reach goes on in a diagram with more of them.
     """
 
-    def __init__(self, scenario: Scenario, instance: ClutterInstance) -> None:
+    def __init__(
+        self, scenario: Scenario, instance: ClutterInstance, torso_m: float | None = None
+    ) -> None:
         self._scenario = scenario
         self._instance = instance
-        self._axes = SkinAxes(scenario.arm())
+        self._torso_m = torso_m
+        self._axes = SkinAxes(scenario.arm(torso_m), instance.num_axes)
         self._objects = np.flatnonzero(instance.movable)
         self._by_spares: dict[int, Simulation] = {}
 
@@ -48,6 +51,10 @@ class WakingSimulation:
     def is_in_collision(self) -> bool:
         """Tells whether the arm touches anything now."""
         return self._now.is_in_collision()
+
+    def find_free(self, angles: Vector) -> Vector | None:
+        """Returns the first joint angles with which the arm touches nothing; see `Simulation`."""
+        return self._now.find_free(angles)
 
     def advance_to(self, time_s: float) -> None:
         """Simulates up to a time; see `Simulation.advance_to`."""
@@ -99,7 +106,8 @@ class WakingSimulation:
 
     def _with_spares(self, spares: int) -> Simulation:
         if spares not in self._by_spares:
-            diagram = make_reach_diagram(self._scenario, put_to_sleep(self._instance, spares))
+            asleep = put_to_sleep(self._instance, spares)
+            diagram = make_reach_diagram(self._scenario, asleep, torso_m=self._torso_m)
             self._by_spares[spares] = Simulation(diagram, self._scenario.scene)
         return self._by_spares[spares]
 

@@ -1,12 +1,15 @@
 """What the other rooms ask of a robot arm."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, ModelInstanceIndex
+
+if TYPE_CHECKING:
+    from lic_drake.robots.skin_shape import SkinShape
 
 Vector = NDArray[np.float64]
 
@@ -39,8 +42,9 @@ class Arm(Protocol):
         q_min: Lower joint limits, shape (m,), radians.
         q_max: Upper joint limits, shape (m,), radians.
         stiffness: Joint stiffness of the impedance controller, shape (m,), Nm/rad.
-        reach_m: Largest distance of the tip from Ro, metres.
-        skin: The surface of the arm.
+        p_RS: The point about which the whole arm turns, shape (3,), metres.
+        reach_m: Largest distance of the tip from it, metres.
+        skin: The surface of the arm, as capsules or by capsules around it.
     """
 
     name: str
@@ -48,8 +52,22 @@ class Arm(Protocol):
     q_min: Vector
     q_max: Vector
     stiffness: Vector
+    p_RS: Vector
     reach_m: float
     skin: tuple[SkinCapsule, ...]
+
+    @property
+    def surface(self) -> "tuple[SkinShape, ...] | None":
+        """The surface itself where its shapes are not capsules."""
+        ...
+
+    def raised(self, torso_m: float) -> "Arm":
+        """Returns the arm on a torso of this height, metres.
+
+        Raises:
+            ScenarioError: The robot's torso cannot go there.
+        """
+        ...
 
     def add_to_plant(
         self, plant: MultibodyPlant, parent: Frame | None = None
@@ -59,6 +77,13 @@ class Arm(Protocol):
 
     def solve_ik(self, x0: Vector) -> Vector | None:
         """Returns the configuration for the hand pose x0, shape (m,), or None."""
+        ...
+
+    def start_angles(self, x0: Vector) -> Vector:
+        """Returns the configurations for the hand pose x0, shape (n, m), those to prefer first.
+
+        Which of them touch anything is not looked at.
+        """
         ...
 
     def tip_pose(self, q: Vector) -> Vector:

@@ -11,9 +11,11 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, ModelInstanceIndex
 
+from lic_drake.errors import ScenarioError
 from lic_drake.paths import models_dir
 from lic_drake.robots.arm import SkinCapsule, Vector
 from lic_drake.robots.planar_kinematics import PlanarArmKinematics
+from lic_drake.robots.skin_shape import SkinShape
 
 LINK_NAMES = ("link1", "link2", "link3")
 
@@ -35,6 +37,7 @@ class PlanarArm:
 
     name = "planar-arm"
     link_names: tuple[str, ...] = LINK_NAMES
+    surface: tuple[SkinShape, ...] | None = None
 
     def __init__(self) -> None:
         plant = MultibodyPlant(time_step=1e-3)
@@ -56,6 +59,7 @@ class PlanarArm:
         )
         self.q_min = self.kinematics.q_min
         self.q_max = self.kinematics.q_max
+        self.p_RS = np.zeros(3)
         self.reach_m = self.kinematics.reach_m
         gains = [
             plant.get_joint_actuator(index).get_controller_gains()
@@ -77,9 +81,22 @@ class PlanarArm:
         plant.set_gravity_enabled(arm, False)
         return arm
 
+    def raised(self, torso_m: float) -> "PlanarArm":
+        """Returns the arm itself, which has no torso; raises a `ScenarioError` if that is not 0."""
+        if torso_m != 0.0:
+            raise ScenarioError(
+                f"the planar arm has no torso; its torso_m must be 0, got {torso_m}"
+            )
+        return self
+
     def solve_ik(self, x0: Vector) -> Vector | None:
         """Returns q for x0 = (x, y, phi), or None; see `PlanarArmKinematics.solve_ik`."""
         return self.kinematics.solve_ik(x0)
+
+    def start_angles(self, x0: Vector) -> Vector:
+        """Returns q for x0 = (x, y, phi), shape (1, 3), or shape (0, 3) if there is none."""
+        q = self.solve_ik(x0)
+        return np.empty((0, 3)) if q is None else q[None]
 
     def tip_pose(self, q: Vector) -> Vector:
         """Returns x0 = (x, y, phi)."""

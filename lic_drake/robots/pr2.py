@@ -90,6 +90,7 @@ class Pr2Arm:
         self.kinematics = Pr2Kinematics(
             yaw=theta, p_RA=p_RA, lengths=pr2.lengths, q_min=self.q_min, q_max=self.q_max
         )
+        self.p_RS = p_RA
         self.reach_m = self.kinematics.reach_m
         # Sensor, controller and stop rules ask for the same configuration, one after the other.
         self._pose = lru_cache(maxsize=1)(self.kinematics.calc_pose)
@@ -118,20 +119,36 @@ class Pr2Arm:
             weld_joints(plant, pr2, stand | rest)
         return pr2
 
+    def raised(self, torso_m: float) -> "Pr2Arm":
+        """Returns the arm of a robot that stands in the same place with its torso at a height.
+
+        Raises:
+            ScenarioError: The torso cannot go there.
+        """
+        return _standing(self.base_pose, torso_m)
+
     def solve_ik(self, x0: Vector) -> Vector | None:
         """Returns the configuration of least cost (Eq. 5) that brings the tool to x0, or None.
 
-        It may collide with the robot: `solve_pose` gives all of them to choose from.
+        It may collide with the robot: `start_angles` gives all of them to choose from.
 
         Args:
             x0: Position and quaternion of the tool frame, shape (7,); of any positive norm.
         """
+        q = self.start_angles(x0)
+        return q[0] if len(q) else None
+
+    def start_angles(self, x0: Vector) -> Vector:
+        """Returns the configurations that bring the tool to x0, shape (n, 7), by Eq. (5).
+
+        Args:
+            x0: As for `solve_ik`.
+        """
         R_RE = RotationMatrix(Quaternion(x0[3:] / np.linalg.norm(x0[3:]))).matrix()
         q = solve_pose(self.kinematics, x0[:3], R_RE)
-        if not len(q):
-            return None
-        best: Vector = q[np.argmin(calc_preselection_cost(self.kinematics, q))]
-        return best
+        cost = calc_preselection_cost(self.kinematics, q)
+        sorted_q: Vector = q[np.argsort(cost, kind="stable")]
+        return sorted_q
 
     def tip_pose(self, q: Vector) -> Vector:
         """Returns x0: p_RE and the quaternion of R_RE with w >= 0, shape (7,)."""
@@ -170,3 +187,8 @@ class Pr2Arm:
 def pr2_arm() -> Pr2Arm:
     """Returns the arm of a robot that stands at the origin, its torso down; made once a process."""
     return Pr2Arm()
+
+
+@lru_cache(maxsize=64)
+def _standing(base_pose: tuple[float, float, float], torso_m: float) -> Pr2Arm:
+    return Pr2Arm(base_pose, torso_m)

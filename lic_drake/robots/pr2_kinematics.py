@@ -74,8 +74,8 @@ class Pr2Kinematics:
 
     @cached_property
     def reach_m(self) -> float:
-        """Bound of the tip's distance from Ro: that of the pan axis and the straight arm."""
-        return float(np.linalg.norm(self.p_RA)) + sum(self.lengths)
+        """Bound of the tip's distance from the pan axis: the straight arm."""
+        return sum(self.lengths)
 
     def within_limits(self, q: Vector, tolerance: float = 1e-9) -> bool:
         """Tells whether q keeps all joint limits, to a tolerance in radians."""

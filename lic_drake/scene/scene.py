@@ -18,7 +18,6 @@ from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, Multibody
 from pydrake.multibody.tree import (
     Frame,
     ModelInstanceIndex,
-    PdControllerGains,
     PrismaticJoint,
     RigidBody,
     SpatialInertia,
@@ -30,6 +29,7 @@ from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import ScenarioError
 from lic_drake.robots.arm import Arm
 from lic_drake.scene.contact import ContactConfig, object_properties, skin_properties
+from lic_drake.scene.movables import add_floating_body, add_sliding_body
 
 TIME_STEP_RANGE_S = (1e-5, 0.1)
 """Shortest and longest step of a discrete plant."""
@@ -59,6 +59,10 @@ class SceneConfig:
     # which it grows, m/s.
     ground_friction_N: float = 2.0
     ground_creep_m_per_s: float = 1e-3
+    # Viscous drag of a floating object, N s/m: 0.1 kg whose velocity halves every 1 ms.
+    drag_N_s_per_m: float = field(default=69.3, metadata={"since": 3})
+    # Density of the skin's sensors, 1/m (paper V-A: 100 in the plane).
+    taxels_per_m: float = field(default=100.0, metadata={"since": 3})
     contact: ContactConfig = field(default_factory=ContactConfig)
 
     def __post_init__(self) -> None:
@@ -78,6 +82,8 @@ class SceneConfig:
             "cenic_max_step_s",
             "ground_friction_N",
             "ground_creep_m_per_s",
+            "drag_N_s_per_m",
+            "taxels_per_m",
         ):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0.0):
@@ -95,7 +101,9 @@ class Scene:
         base: Model instance of the mobile base, without any positions where it stands still.
         clutter: Model instance of the movable objects.
         skin_links: Skin geometry -> index into the arm's link names.
+        body: Collision geometry of the rest of the robot, which has no skin.
         objects: Collision geometry of each object of the instance.
+        num_axes: In how many directions its movable objects move.
     """
 
     plant: MultibodyPlant
@@ -104,7 +112,9 @@ class Scene:
     base: ModelInstanceIndex
     clutter: ModelInstanceIndex
     skin_links: dict[GeometryId, int]
+    body: tuple[GeometryId, ...]
     objects: tuple[GeometryId, ...]
+    num_axes: int
 
 
 def add_scene(
@@ -117,13 +127,11 @@ def add_scene(
 ) -> Scene:
     """Adds a plant with the arm and the clutter, and its scene graph, to a builder.
 
-    Movable objects translate in the ground plane on two prismatic joints: the friction torque of
-    the authors' objects is larger than any contact torque, so they never spin. Their dry ground
-    friction is an actuator without stiffness: a strong damper whose force saturates, which Drake
-    integrates implicitly. The actuators' desired-state port must get zeros. Unless `visuals`, the
-    objects cannot be seen, which saves a quarter of the time that building takes. With
-    `base_slides` the arm's base has two positions, x and y, for drawings of a robot that moves
-    between reaches; nothing drives it.
+    Movable objects only translate, in the ground plane or, floating, in space: the friction torque
+    of the authors' planar objects is larger than any contact torque, so they never spin. See
+    `lic_drake.scene.movables` for what resists them. Unless `visuals`, the objects cannot be seen,
+    which saves a quarter of the time that building takes. With `base_slides` the arm's base has two
+    positions, x and y, for drawings of a robot that moves between reaches; nothing drives it.
     """
     plant, scene_graph = AddMultibodyPlant(
         MultibodyPlantConfig(
@@ -144,9 +152,7 @@ def add_scene(
         X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, instance.yaw[i]), instance.p_WO[i])
         name = f"object{i}"
         if instance.movable[i]:
-            body = _add_sliding_body(
-                plant, clutter, name, instance.mass[i], instance.p_WO[i], config
-            )
+            body = _add_movable(plant, clutter, name, instance, i, config)
             X_BO = RigidTransform(RollPitchYaw(0.0, 0.0, instance.yaw[i]), np.zeros(3))
         else:
             body, X_BO = plant.world_body(), X_WO
@@ -167,7 +173,9 @@ def add_scene(
         base=base,
         clutter=clutter,
         skin_links=skin_links,
+        body=_find_body(plant, arm_instance, skin_links),
         objects=tuple(objects),
+        num_axes=instance.num_axes,
     )
 
 
@@ -191,6 +199,18 @@ def _wear_skin(
     return skin_links
 
 
+def _find_body(
+    plant: MultibodyPlant, robot: ModelInstanceIndex, skin_links: dict[GeometryId, int]
+) -> tuple[GeometryId, ...]:
+    """Returns the collision geometry of a robot that is not skin."""
+    return tuple(
+        geometry
+        for body in plant.GetBodyIndices(robot)
+        for geometry in plant.GetCollisionGeometriesForBody(plant.get_body(body))
+        if geometry not in skin_links
+    )
+
+
 def _add_base(plant: MultibodyPlant, base: ModelInstanceIndex) -> Frame:
     """Adds a base that slides along x and y; returns the frame that carries the arm."""
     frame = plant.world_frame()
@@ -210,38 +230,21 @@ def _add_base(plant: MultibodyPlant, base: ModelInstanceIndex) -> Frame:
     return frame
 
 
-def _add_sliding_body(
+def _add_movable(
     plant: MultibodyPlant,
     clutter: ModelInstanceIndex,
     name: str,
-    mass: float,
-    p_WO: NDArray[np.float64],
+    instance: ClutterInstance,
+    i: int,
     config: SceneConfig,
 ) -> RigidBody:
-    """Adds a body that slides in the ground plane against dry friction."""
-    carriage = plant.AddRigidBody(
-        f"{name}_carriage",
-        clutter,
-        SpatialInertia(1e-3 * mass, np.zeros(3), UnitInertia.SolidSphere(0.01)),
+    """Adds the body of the movable object i."""
+    mass, p_WO = instance.mass[i], instance.p_WO[i]
+    if instance.num_axes == 3:
+        return add_floating_body(plant, clutter, name, mass, p_WO, config.drag_N_s_per_m)
+    return add_sliding_body(
+        plant, clutter, name, mass, p_WO, config.ground_friction_N, config.ground_creep_m_per_s
     )
-    body = plant.AddRigidBody(
-        name, clutter, SpatialInertia(mass, np.zeros(3), UnitInertia.SolidSphere(0.01))
-    )
-    # Friction acts along x and y apart, so its resistance to motion in a direction u is
-    # limit (|u_x| + |u_y|), which over all directions has the mean 4/pi limit.
-    limit = 0.25 * np.pi * config.ground_friction_N
-    gains = PdControllerGains(p=0.0, d=limit / config.ground_creep_m_per_s)
-    for axis, parent, child, offset in (
-        ("x", plant.world_frame(), carriage.body_frame(), p_WO[0]),
-        ("y", carriage.body_frame(), body.body_frame(), p_WO[1]),
-    ):
-        joint = plant.AddJoint(
-            PrismaticJoint(f"{name}_{axis}", parent, child, np.eye(3)["xy".index(axis)])
-        )
-        joint.set_default_positions(np.array([offset]))
-        actuator = plant.AddJointActuator(joint.name(), joint, limit)
-        actuator.set_controller_gains(gains)
-    return body
 
 
 def make_shape(shape: str, size: NDArray[np.float64]) -> Shape:

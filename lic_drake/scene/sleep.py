@@ -40,7 +40,7 @@ class MovedTooFarError(Exception):
 
 
 def can_sleep(instance: ClutterInstance) -> bool:
-    """Tells whether the movable objects are upright and all alike, so that a spare fits any."""
+    """Tells whether the movable objects are all alike, so that a spare fits any."""
     shapes = {s for s, movable in zip(instance.shape, instance.movable, strict=True) if movable}
     if shapes not in ({"cylinder"}, {"sphere"}):
         return False
@@ -58,7 +58,7 @@ def put_to_sleep(instance: ClutterInstance, spares: int) -> ClutterInstance:
     n, first = instance.num_objects, int(np.argmax(instance.movable))
     pick = np.r_[np.arange(n), np.full(spares, first)]
     p_WO = instance.p_WO[pick]
-    p_WO[n:, :2] = PARKING_M + np.arange(spares)[:, np.newaxis]
+    p_WO[n:, : instance.num_axes] = PARKING_M + np.arange(spares)[:, np.newaxis]
     return replace(
         instance,
         shape=tuple(instance.shape[i] for i in pick),
@@ -71,9 +71,15 @@ def put_to_sleep(instance: ClutterInstance, spares: int) -> ClutterInstance:
 
 
 class SkinAxes:
-    """The axes of an arm's skin capsules, seen from above."""
+    """The axes of an arm's skin capsules: seen from above, or in space.
 
-    def __init__(self, arm: Arm) -> None:
+    Args:
+        arm: The arm.
+        num_axes: 2 for what slides on the ground, 3 for what floats.
+    """
+
+    def __init__(self, arm: Arm, num_axes: int = 2) -> None:
+        self._num_axes = num_axes
         half = np.array([0.5 * c.length * c.R_LC[:, 2] for c in arm.skin])
         centre = np.array([c.p_LC for c in arm.skin])
         self._arm = arm
@@ -82,17 +88,18 @@ class SkinAxes:
         self._radius = np.array([c.radius for c in arm.skin])[:, np.newaxis]
 
     def ends(self, q: Vector) -> Vector:
-        """Returns the ends of the axes, shape (capsules, 2, 2): x and y of both, metres."""
+        """Returns the ends of the axes, shape (capsules, num_axes, 2): x, y, .. of both, metres."""
         R_WL, p_WL = self._arm.link_poses(q)
-        ends: Vector = R_WL[self._link, :2] @ self._p_LA + p_WL[self._link, :2, np.newaxis]
+        d = self._num_axes
+        ends: Vector = R_WL[self._link, :d] @ self._p_LA + p_WL[self._link, :d, np.newaxis]
         return ends
 
     def gaps(self, ends: Vector, p_WO: Vector) -> Vector:
-        """Returns the horizontal distances from the skin to points, shape (n,), metres.
+        """Returns the distances from the skin to points, shape (n,), metres.
 
         Args:
             ends: What `ends` returned.
-            p_WO: Shape (n, 2), metres.
+            p_WO: Shape (n, num_axes), metres.
         """
         along = ends[:, :, 1] - ends[:, :, 0]
         d = p_WO - ends[:, np.newaxis, :, 0]
@@ -106,13 +113,13 @@ class SleepMonitor:
     """Follows the arm and the pushed objects, and says which objects have to wake up.
 
     Attributes:
-        p_WO: Positions of all movable objects, shape (n, 2), metres.
+        p_WO: Positions of all movable objects, shape (n, num_axes), metres.
     """
 
     def __init__(self, instance: ClutterInstance, axes: SkinAxes, q: Vector) -> None:
         self._axes = axes
         self._ends = axes.ends(q)
-        self._p_WO_first = instance.p_WO[instance.movable, :2]
+        self._p_WO_first = instance.p_WO[instance.movable, : instance.num_axes]
         self._radius = float(instance.size[instance.movable, 0].max(initial=0.0))
         self._is_awake = np.zeros(len(self._p_WO_first), dtype=bool)
         self._pushed = np.zeros_like(self._is_awake)
@@ -125,8 +132,8 @@ class SleepMonitor:
 
         Args:
             q: Joint angles, shape (m,), radians.
-            p_WO_awake: Positions of the objects that are awake, shape (k, 2), metres, in the
-                order in which they woke up.
+            p_WO_awake: Positions of the objects that are awake, shape (k, num_axes), metres, in
+                the order in which they woke up.
 
         Raises:
             MovedTooFarError: An object may have been touched while it was asleep.

@@ -10,6 +10,7 @@ from lic_drake.clutter.cylinder import CylinderClutter
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.clutter.passage import PassageClutter
 from lic_drake.clutter.registry import category_names, get_category, register_category
+from lic_drake.clutter.sphere import SphereApertureClutter
 from lic_drake.errors import ScenarioError
 from lic_drake.reach.scenario import parse_scenario
 
@@ -44,6 +45,7 @@ def _restore(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         ("cylinder-clutter", CylinderClutter),
         ("passage-clutter", PassageClutter),
         ("cylinder-aperture-clutter", CylinderApertureClutter),
+        ("sphere-aperture-clutter", SphereApertureClutter),
     ],
 )
 def test_the_papers_categories_are_known(name: str, sampler: type) -> None:

@@ -31,8 +31,21 @@ def test_the_2013_controller_has_its_published_values() -> None:
         "reset_windup_deg": 45.0,
         "equilibrium_in_limits": True,
         "forgive_joint_limits": True,
+        "deadzone_m": 0.0,
     }
     assert config.period_s == 0.04
+
+
+def test_the_controller_of_the_pr2_differs_where_its_file_does() -> None:
+    published = {
+        "force_threshold_N": 3.0,
+        "contact_stiffness_N_per_m": 200.0,
+        "slow_distance_m": 0.25,
+        "max_windup_deg": 20.0,
+        "reset_windup_deg": 30.0,
+        "deadzone_m": 0.01,
+    }
+    assert vars(PRESETS["pr2"]()) == vars(PRESETS["haptic_mpc_2013"]()) | published
 
 
 def test_the_controller_of_reference_1_has_its_published_values() -> None:
@@ -58,6 +71,7 @@ def test_the_controller_of_reference_1_has_its_published_values() -> None:
         "reset_windup_deg": INF,
         "equilibrium_in_limits": False,
         "forgive_joint_limits": False,
+        "deadzone_m": 0.0,
     }
 
 

@@ -1,0 +1,65 @@
+"""Whether an arm touches anything: the clutter, the board, or the robot's own body."""
+
+from dataclasses import replace
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import QueryObject
+from pydrake.systems.framework import Context, DiagramBuilder
+
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.robots.arm import Arm
+from lic_drake.scene.scene import Scene, SceneConfig, add_scene
+
+Vector = NDArray[np.float64]
+
+
+def is_touching(scene: Scene, root: Context) -> bool:
+    """Tells whether the arm touches anything, in a context of the diagram that has the scene."""
+    query = cast(
+        QueryObject,
+        scene.scene_graph.get_query_output_port().Eval(
+            scene.scene_graph.GetMyContextFromRoot(root)
+        ),
+    )
+    # Objects that an earlier reach pushed together touch each other, which does not matter.
+    return bool(query.HasCollisions()) and any(
+        pair.id_A in scene.skin_links or pair.id_B in scene.skin_links
+        for pair in query.ComputePointPairPenetration()
+    )
+
+
+class CollisionChecker:
+    """A robot before the fixed objects of an environment, which are all that it can know of it.
+
+    Args:
+        arm: The arm with the robot that carries it.
+        instance: The environment in the robot's frame.
+        config: Gives the contact properties.
+    """
+
+    def __init__(self, arm: Arm, instance: ClutterInstance, config: SceneConfig) -> None:
+        builder = DiagramBuilder()
+        self._scene = add_scene(builder, arm, _fixed_part(instance), config)
+        self._diagram = builder.Build()
+        self._root = self._diagram.CreateDefaultContext()
+        self._context = self._scene.plant.GetMyMutableContextFromRoot(self._root)
+
+    def touches(self, q: Vector) -> bool:
+        """Tells whether the arm touches anything at joint angles q, shape (m,), radians."""
+        self._scene.plant.SetPositions(self._context, self._scene.arm, q)
+        return is_touching(self._scene, self._root)
+
+
+def _fixed_part(instance: ClutterInstance) -> ClutterInstance:
+    keep = np.flatnonzero(~instance.movable)
+    return replace(
+        instance,
+        shape=tuple(instance.shape[i] for i in keep),
+        size=instance.size[keep],
+        p_WO=instance.p_WO[keep],
+        yaw=instance.yaw[keep],
+        mass=instance.mass[keep],
+        movable=instance.movable[keep],
+    )

@@ -1,0 +1,70 @@
+"""What the PR2's skin feels, and what it does not."""
+
+import numpy as np
+import pytest
+from pr2_reaches import ARM, SCENARIO, felt, spheres
+
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.control.surface_taxels import make_taxels
+
+LAYOUT = make_taxels(ARM, SCENARIO.scene.taxels_per_m)
+RADIUS = 0.05
+NOTHING = spheres()
+
+
+def press_on(link: int, p_LT: np.ndarray, n_L: np.ndarray, depth: float) -> ClutterInstance:
+    """A fixed sphere that the arm at home is pressed against at a point of a link."""
+    R_RL, p_RL = ARM.link_poses(ARM.q_home)
+    centre = p_RL[link] + R_RL[link] @ (p_LT + (RADIUS - depth) * n_L)
+    return spheres(centre, radius=RADIUS)
+
+
+# The middles of faces that nothing covers: upper arm, forearm and hand.
+PLACES = {
+    "r_upper_arm_roll_link": ([0.29, 0.0, -0.0815], [0.0, 0.0, -1.0]),
+    "r_forearm_roll_link": ([0.236, 0.0, -0.0445], [0.0, 0.0, -1.0]),
+    "r_wrist_roll_link": ([0.1885, 0.0, 0.0], [1.0, 0.0, 0.0]),
+}
+
+
+@pytest.mark.parametrize("name", PLACES)
+def test_a_contact_is_felt_where_it_is_and_nowhere_else(name: str) -> None:
+    link = ARM.link_names.index(name)
+    p_LT, n_L = map(np.array, PLACES[name])
+    _, force = felt(press_on(link, p_LT, n_L, 3e-3), ARM.q_home)
+    loaded = np.flatnonzero(force)
+    assert len(loaded) >= 1
+    assert set(LAYOUT.link[loaded]) == {link}
+    strongest = np.argmax(force)
+    np.testing.assert_allclose(LAYOUT.n_L[strongest], n_L, atol=1e-9)
+    assert np.linalg.norm(LAYOUT.p_LT[strongest] - p_LT) < 1.5 * LAYOUT.pitch_m
+
+
+def test_a_touch_less_than_the_gap_is_not_felt() -> None:
+    link = ARM.link_names.index("r_forearm_roll_link")
+    p_LT, n_L = map(np.array, PLACES["r_forearm_roll_link"])
+    _, force = felt(press_on(link, p_LT, n_L, -1e-3), ARM.q_home)
+    assert not np.any(force)
+
+
+def test_a_deeper_press_is_a_larger_force() -> None:
+    link = ARM.link_names.index("r_forearm_roll_link")
+    p_LT, n_L = map(np.array, PLACES["r_forearm_roll_link"])
+    forces = [felt(press_on(link, p_LT, n_L, d), ARM.q_home)[1].sum() for d in (2e-3, 3e-3, 4e-3)]
+    assert 0.0 < forces[0] < forces[1] < forces[2]
+
+
+def test_the_arm_does_not_feel_the_robots_own_body() -> None:
+    rng = np.random.default_rng(0)
+    touching = 0
+    made, force = felt(NOTHING, ARM.q_home)
+    assert not np.any(force)
+    context = made.diagram.CreateDefaultContext()
+    results = made.scene.plant.get_contact_results_output_port()
+    for _ in range(40):
+        q = rng.uniform(ARM.q_min, ARM.q_max)
+        made.set_start(context, q, np.zeros(3))
+        contacts = results.Eval(made.scene.plant.GetMyContextFromRoot(context))
+        touching += contacts.num_point_pair_contacts() + contacts.num_hydroelastic_contacts() > 0
+        assert not np.any(made.diagram.GetOutputPort("taxel_force").Eval(context))
+    assert touching >= 2
