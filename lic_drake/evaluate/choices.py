@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lic_drake.estimate.estimator import SuccessEstimator
 from lic_drake.estimate.features import FeatureMap
 from lic_drake.evaluate.bounds import Bound
 
@@ -34,6 +33,22 @@ class Choices:
     environment: NDArray[np.intp]
     Z: Vector
 
+    def chosen_rate(self, score: Vector) -> Vector:
+        """Returns the success of the starts with the best score in each environment, shape (E,).
+
+        Starts of equal score share the choice.
+
+        Args:
+            score: Score of each reach's start, shape (n,), for instance an estimate.
+        """
+        best = np.full(self.environment.max() + 1, -np.inf)
+        np.maximum.at(best, self.environment, score)
+        chosen = score == best[self.environment]
+        rate: Vector = np.bincount(self.environment[chosen], self.success[chosen]) / np.bincount(
+            self.environment[chosen]
+        )
+        return rate
+
 
 def load_choices(columns: Mapping[str, NDArray[Any]], features: FeatureMap) -> Choices:
     """Returns the choices that a library holds, see `ExperienceLibrary.columns`."""
@@ -42,38 +57,34 @@ def load_choices(columns: Mapping[str, NDArray[Any]], features: FeatureMap) -> C
     return Choices(success=rows.f > 0.5, environment=environment.ravel(), Z=rows.Z)
 
 
-def choice_bounds(choices: Choices, reference: SuccessEstimator) -> list[Bound]:
+def choice_bounds(choices: Choices, reference: Vector) -> list[Bound]:
     """Returns RND's rate and the bounds above it, for one and for two attempts.
 
     Two attempts find fresh copies of the environment.
 
     Args:
         choices: The reaches.
-        reference: An estimator that never saw their environments.
+        reference: Estimates for them, shape (n,), by an estimator that never saw their
+            environments.
     """
-    score = reference.values(choices.Z)
-    groups = [choices.environment == e for e in range(choices.environment.max() + 1)]
-    success = [choices.success[group] for group in groups]
-    best = [score[group] == score[group].max() for group in groups]
+    tries = np.bincount(choices.environment)
+    wins = np.bincount(choices.environment, choices.success).astype(int)
+    oracle = (wins > 0).astype(float)
     return [
-        Bound(name="RND", attempts=1, by_environment=_random(success, 1)),
+        Bound(name="RND", attempts=1, by_environment=wins / tries),
         Bound(
             name="best start by more experience, held out",
             attempts=1,
-            by_environment=np.array([s[b].mean() for s, b in zip(success, best, strict=True)]),
+            by_environment=choices.chosen_rate(reference),
         ),
-        Bound(
-            name="oracle", attempts=1, by_environment=np.array([s.any() for s in success], float)
-        ),
-        Bound(name="RND", attempts=2, by_environment=_random(success, 2)),
-        Bound(
-            name="oracle", attempts=2, by_environment=np.array([s.any() for s in success], float)
-        ),
+        Bound(name="oracle", attempts=1, by_environment=oracle),
+        Bound(name="RND", attempts=2, by_environment=_two_random(tries, wins)),
+        Bound(name="oracle", attempts=2, by_environment=oracle),
     ]
 
 
-def _random(success: list[NDArray[np.bool_]], attempts: int) -> Vector:
-    """Returns RND's expected success in each environment, without trying a start twice."""
+def _two_random(tries: NDArray[np.intp], wins: NDArray[np.intp]) -> Vector:
+    """Returns RND's expected success in two attempts from different starts, shape (E,)."""
     return np.array(
-        [1.0 - math.comb(int((~s).sum()), attempts) / math.comb(len(s), attempts) for s in success]
+        [1.0 - math.comb(n - k, 2) / math.comb(n, 2) for n, k in zip(tries, wins, strict=True)]
     )

@@ -9,7 +9,6 @@ import pytest
 
 from lic_drake.estimate.estimator import Prediction
 from lic_drake.estimate.features import ExperienceRows
-from lic_drake.estimate.registry import make_estimator
 
 SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "ablate_estimators.py"
 
@@ -71,7 +70,10 @@ def test_it_writes_tables_of_first_and_second_reaches(
     script, library, tmp_path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(script, "OBSERVED", {"x0'": script.X0})
-    monkeypatch.setattr(script, "make_estimator", lambda name, *features: make_estimator("knn"))
+    # Any quick estimator: the real ones take minutes.
+    quick = script.FixedBandwidth(0.3)
+    monkeypatch.setattr(script, "make_estimator", lambda name, *features: quick)
+    monkeypatch.setattr(script, "small_local_neighbours", lambda features: quick)
     out = tmp_path / "out"
     monkeypatch.setattr(
         sys, "argv", ["ablate_estimators.py", str(library), "--folds", "2", "--out", str(out)]

@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-from select_surfaces import Bumps
 
 from lic_drake.evaluate.choices import Choices, choice_bounds
 
@@ -14,9 +13,13 @@ CHOICES = Choices(
 
 def test_bounds_of_a_small_example() -> None:
     # The reference likes y = 0 best: right in the first environment, wrong in the second.
-    reference = Bumps(np.array([[0.0, 0.0]]), np.array([0.9]), np.array([0.2, 0.5]))
+    reference = -CHOICES.Z[:, 2]
     rates = {(b.name, b.attempts): b.rate for b in choice_bounds(CHOICES, reference)}
     assert rates["RND", 1] == pytest.approx((1 / 3 + 1 / 2) / 2)
     assert rates["RND", 2] == pytest.approx((2 / 3 + 1) / 2)
     assert rates["best start by more experience, held out", 1] == pytest.approx(0.5)
     assert rates["oracle", 1] == rates["oracle", 2] == 1.0
+
+
+def test_starts_of_equal_score_share_the_choice() -> None:
+    np.testing.assert_allclose(CHOICES.chosen_rate(np.zeros(5)), [1 / 3, 1 / 2])
