@@ -1,17 +1,22 @@
 """Reaches of the PR2: in free space, against a fixed sphere, and into 40 floating ones."""
 
+import re
+from base64 import b64decode
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from fake_reach import comparable
 from pr2_reaches import ARM, SCENARIO, pr2_of, spheres
 
-from lic_drake.errors import ScenarioError
+from lic_drake.errors import RequestError, ScenarioError
+from lic_drake.experience.grid import CollectionRequest
 from lic_drake.reach import rollout
 from lic_drake.reach.diagram import make_reach_diagram
 from lic_drake.reach.environment import Environment, simulate
 from lic_drake.reach.pointing_starts import find_pointing_starts
+from lic_drake.reach.recording import ReachRecording
 from lic_drake.reach.request import make_request, request_of
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import load_scenario
@@ -46,12 +51,10 @@ def test_nearly_all_goals_that_the_arm_can_reach_are_reached_in_free_space() -> 
     rng = np.random.default_rng(0)
     count = reached = 0
     while count < 100:
-        # Where the tool can be, with the elbow and wrist bent as in a start.
         goal = ARM.tip_position(rng.uniform(ARM.q_min, ARM.q_max))
         if goal[0] > 0.45 and 0.5 < goal[2] < 1.5:
             count += 1
             reached += reach_freely(goal).outcome == "reached"
-    print(f"{reached} of {count} reached")
     assert reached >= 0.95 * count
 
 
@@ -112,6 +115,34 @@ def test_a_reach_into_forty_spheres_gives_the_same_record_again() -> None:
     lone = run_reach(request, sleep=False)
     assert lone.outcome == record.outcome
     np.testing.assert_allclose(lone.q_final, record.q_final, atol=1e-3)
+
+
+def test_a_start_of_the_wrong_kind_is_refused() -> None:
+    p_WG = BRIEF.goals("training", 1)[6]
+    with pytest.raises(RequestError, match=r"a start of pr2 has 7 numbers \(x, y, z, qw"):
+        make_request(BRIEF, "training", 1, p_WG, np.zeros(3))
+
+
+def test_a_collection_holds_every_goal_from_every_start() -> None:
+    requests = CollectionRequest(scenario=BRIEF, environments=1).reaches(0)
+    assert len({request.key for request in requests}) == 12 * 19
+    assert {request.torso for request in requests} == {0.15}
+
+
+def test_a_recording_shows_the_robot(tmp_path: Path) -> None:
+    short = load_scenario("sphere-aperture-clutter", "{stop: {timeout_s: 0.08}}")
+    instance = short.sample_instance("training", 0)
+    p_WG, start = short.goals("training", 0)[4], find_pointing_starts(short, instance, None, 0.16)
+    environment = Environment(short, instance, p_WR=np.array([0.0, 0.01, 0.0]), torso_m=0.16)
+    result = environment.reach(p_WG, start.x0[7] + np.pad([0.0, 0.01], (0, 5)), keep_states=True)
+    assert result.outcome in ("timeout", "invalid_start")
+    recording = ReachRecording(short, instance, 0.16)
+    recording.add_reach(result.trace, p_WG)
+    recording.save(tmp_path / "pr2.html")
+    content = (tmp_path / "pr2.html").read_text(encoding="utf-8")
+    messages = b"".join(b64decode(text) for text in re.findall(r"base64,([\w+/]+=*)", content))
+    assert b"r_wrist_roll_link" in messages
+    assert b"object39" in messages
 
 
 def test_a_further_reach_finds_the_spheres_where_the_first_left_them() -> None:
