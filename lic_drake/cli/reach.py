@@ -143,7 +143,7 @@ def _record(request: "ReachRequest", path: Path) -> None:
     from lic_drake.reach.recording import ReachRecording
     from lic_drake.reach.rollout import instance_of, simulate_request
 
-    recording = ReachRecording(request.scenario, instance_of(request))
+    recording = ReachRecording(request.scenario, instance_of(request), request.torso)
     recording.add_reach(simulate_request(request, keep_states=True).trace, np.array(request.goal))
     recording.save(path)
 

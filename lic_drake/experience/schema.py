@@ -152,6 +152,11 @@ def _read(path: Path, columns: list[str] | None) -> tuple[TableHeader, pa.Table]
             wanted = FIELDS if columns is None else columns
             later = {name for name in wanted if _SINCE[name] > header.schema_version}
             table = file.read(columns=[name for name in wanted if name not in later])
+            # Checksums are of pages only: a damaged footer can hide rows.
+            groups = [file.metadata.row_group(i) for i in range(file.num_row_groups)]
+            rows = {file.metadata.num_rows, sum(group.num_rows for group in groups)}
+            if rows != {table.num_rows}:
+                raise pa.ArrowInvalid(f"rows of the parts and of the whole differ: {rows}")
             return header, _with_defaults(table, wanted, later)
     except (OSError, UnicodeDecodeError, pa.ArrowException) as error:
         # Damage makes pyarrow raise OSErrors, too, but without an error number.

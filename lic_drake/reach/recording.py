@@ -27,6 +27,12 @@ TICKS_PER_FRAME = 10
 MAX_FRAMES_PER_SECOND = 30.0
 """A recording has no more frames a second."""
 
+_CAMERA = {
+    2: (np.array([-0.4, -0.3, 1.05]), np.array([0.45, 0.02, 0.0])),
+    3: (np.array([-0.45, -1.65, 1.65]), np.array([0.4, -0.15, 0.85])),
+}
+"""Where the camera is, and what it looks at: on the ground, and on a robot and its clutter."""
+
 
 def frame_rate(control_rate_hz: float) -> float:
     """Returns the frames per second of a recording: the control rate, halved while too high.
@@ -44,20 +50,30 @@ class ReachRecording:
 
     A reach is simulated first, as anywhere else but with its states kept, and its samples are
     drawn afterwards. Must be used from the thread that made it.
+
+    Args:
+        scenario: Robot, task and control rate.
+        instance: The environment.
+        torso_m: Height of the robot's torso, metres; by default as the scenario's task has it.
     """
 
-    def __init__(self, scenario: Scenario, instance: ClutterInstance) -> None:
+    def __init__(
+        self, scenario: Scenario, instance: ClutterInstance, torso_m: float | None = None
+    ) -> None:
         self._scenario = scenario
         self._meshcat = _make_meshcat()
         self._frames_per_second = frame_rate(scenario.mpc.rate_hz)
-        diagram = make_reach_diagram(scenario, instance, self._meshcat, base_slides=True)
+        diagram = make_reach_diagram(
+            scenario, instance, self._meshcat, base_slides=True, torso_m=torso_m
+        )
         self._drawing = Simulation(diagram, scenario.scene)
-        self._draw_start_line()
+        if instance.num_axes == 2:
+            self._draw_start_line()
         self._meshcat.SetProperty("/Background", "top_color", [0.97, 0.97, 0.98])
         self._meshcat.SetProperty("/Background", "bottom_color", [0.97, 0.97, 0.98])
         self._meshcat.SetProperty("/Grid", "visible", False)
         self._meshcat.SetProperty("/Axes", "visible", False)
-        self._meshcat.SetCameraPose(np.array([-0.4, -0.3, 1.05]), np.array([0.45, 0.02, 0.0]))
+        self._meshcat.SetCameraPose(*_CAMERA[instance.num_axes])
         self._meshcat.StartRecording(
             TICKS_PER_FRAME * self._frames_per_second, set_visualizations_while_recording=False
         )

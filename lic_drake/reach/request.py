@@ -18,8 +18,10 @@ failure of the simulator; before it began, because the arm cannot stand at the s
 the goal is further away than the arm is long."""
 
 
-IN_SPACE = 7
-"""Length of a start pose in space; one in the plane has 3 numbers."""
+IN_PLANE, IN_SPACE = 3, 7
+"""Lengths of hand poses in the plane and in space."""
+
+_POSES = {IN_PLANE: "x, y, phi", IN_SPACE: "x, y, z, qw, qx, qy, qz"}
 
 
 class EarlierReach(NamedTuple):
@@ -132,7 +134,15 @@ def make_request(
         x0: Start pose, shape (3,), or (7,) in space.
         p_WR: Base, shape (2,) or (3,), metres; by default at the origin.
         torso_m: Height of the torso, metres; by default as the scenario's task has it.
+
+    Raises:
+        RequestError: The robot has start poses of another kind.
     """
+    size = IN_PLANE if scenario.arm().surface is None else IN_SPACE
+    if x0.shape != (size,):
+        raise RequestError(
+            f"a start of {scenario.robot} has {size} numbers ({_POSES[size]}), got {x0.tolist()}"
+        )
     return ReachRequest(
         scenario=scenario,
         stream=stream,

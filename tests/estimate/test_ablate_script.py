@@ -70,6 +70,7 @@ def test_it_writes_tables_of_first_and_second_reaches(
     script, library, tmp_path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(script, "OBSERVED", {"x0'": script.X0})
+    monkeypatch.setattr(script, "GP_OBSERVED", ("x0'",))
     # Any quick estimator: the real ones take minutes.
     quick = script.FixedBandwidth(0.3)
     monkeypatch.setattr(script, "make_estimator", lambda name, *features: quick)

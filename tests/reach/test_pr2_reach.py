@@ -1,0 +1,158 @@
+"""Reaches of the PR2: in free space, against a fixed sphere, and into 40 floating ones."""
+
+import re
+from base64 import b64decode
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fake_reach import comparable
+from pr2_reaches import ARM, SCENARIO, pr2_of, spheres
+
+from lic_drake.errors import RequestError, ScenarioError
+from lic_drake.experience.grid import CollectionRequest
+from lic_drake.reach import rollout
+from lic_drake.reach.diagram import make_reach_diagram
+from lic_drake.reach.environment import Environment, simulate
+from lic_drake.reach.pointing_starts import find_pointing_starts
+from lic_drake.reach.recording import ReachRecording
+from lic_drake.reach.request import make_request, request_of
+from lic_drake.reach.rollout import run_reach
+from lic_drake.reach.scenario import load_scenario
+from lic_drake.reach.simulation import Simulation
+from lic_drake.reach.trace import ReachResult
+
+PRECISE = load_scenario("sphere-aperture-clutter", "{stop: {success_distance_m: 0.01}}")
+FREE = Environment(PRECISE, spheres())
+BRIEF = load_scenario("sphere-aperture-clutter", "{stop: {timeout_s: 0.6}}")
+
+
+def reach_freely(p_WG: np.ndarray, q: np.ndarray = ARM.q_home) -> ReachResult:
+    return FREE.reach(p_WG, ARM.tip_pose(q))
+
+
+@pytest.mark.parametrize(
+    "p_WG", [(0.75, -0.2, 1.0), (0.6, -0.6, 0.8), (0.5, 0.1, 1.2), (0.7, -0.3, 0.6)]
+)
+def test_in_free_space_the_tool_comes_within_a_centimetre(p_WG: tuple[float, ...]) -> None:
+    result = reach_freely(np.array(p_WG))
+    assert result.outcome == "reached"
+    assert np.linalg.norm(result.trace.p_WE[-1] - p_WG) < 0.01
+    assert max(result.trace.peak_force) == 0.0
+    assert result.trace.time_s[-1] < 15.0
+    for q in result.trace.q:
+        assert np.all(q >= ARM.q_min - 0.02)
+        assert np.all(q <= ARM.q_max + 0.02)
+
+
+@pytest.mark.slow
+def test_nearly_all_goals_that_the_arm_can_reach_are_reached_in_free_space() -> None:
+    rng = np.random.default_rng(0)
+    count = reached = 0
+    while count < 100:
+        goal = ARM.tip_position(rng.uniform(ARM.q_min, ARM.q_max))
+        if goal[0] > 0.45 and 0.5 < goal[2] < 1.5:
+            count += 1
+            reached += reach_freely(goal).outcome == "reached"
+    assert reached >= 0.95 * count
+
+
+def test_a_forearm_turns_on_beyond_half_a_turn() -> None:
+    q = ARM.q_home.copy()
+    q[[4, 5]] = 3.1, -1.6
+    beyond = q.copy()
+    beyond[4] += 1.2
+    simulation = Simulation(make_reach_diagram(PRECISE, spheres()), PRECISE.scene)
+    result = simulate(simulation, PRECISE, q, ARM.tip_position(beyond))
+    assert result.outcome == "reached"
+    rolls = np.array(result.trace.q)[:, 4]
+    assert rolls[0] == 3.1
+    assert rolls.max() > np.pi + 0.05
+    assert np.max(np.abs(np.diff(rolls))) < 0.05
+
+
+def test_against_a_fixed_sphere_the_force_settles_at_the_threshold() -> None:
+    p_WE, u_W = ARM.tip_position(ARM.q_home), ARM.tip_rotation(ARM.q_home)[:, 0]
+    # Its surface is 5 cm before the fingertips, which end 8.5 mm beyond the tool frame. With the
+    # goal in its middle there is no way past it.
+    centre = p_WE + (0.0085 + 0.05 + 0.05) * u_W
+    result = Environment(SCENARIO, spheres(centre)).reach(centre, ARM.tip_pose(ARM.q_home))
+    assert result.outcome == "stuck"
+    np.testing.assert_allclose(result.trace.peak_force[-25:], 3.0, rtol=0.2)
+
+
+def test_the_torso_lifts_the_arm_and_has_its_range() -> None:
+    raised = pr2_of(replace(SCENARIO, task=replace(SCENARIO.task, torso_m=0.25)))
+    lift = raised.tip_position(ARM.q_home) - ARM.tip_position(ARM.q_home)
+    np.testing.assert_allclose(lift, [0.0, 0.0, 0.1], atol=1e-12)
+    with pytest.raises(ScenarioError, match="torso_m must be from"):
+        load_scenario("sphere-aperture-clutter", "{task: {torso_m: 0.0}}")
+
+
+def test_a_reach_into_forty_spheres_gives_the_same_record_again() -> None:
+    instance = BRIEF.sample_instance("training", 1)
+    start = find_pointing_starts(BRIEF, instance, np.array([0.01, 0.02]), 0.16)
+    p_WG = BRIEF.goals("training", 1)[6]
+    request = make_request(BRIEF, "training", 1, p_WG, start.x0[8], start.p_WR, start.torso_m)
+    record = run_reach(request)
+    assert record.outcome == "timeout"
+    assert record.robot == "pr2"
+    assert (record.base_x, record.base_y, record.torso) == (0.01, 0.02, 0.16)
+    assert record.in_space
+    np.testing.assert_array_equal(record.x0, start.x0[8])
+    np.testing.assert_allclose(record.q_start, start.q[8], atol=1e-6)
+    final = pr2_of(BRIEF).raised(0.16).tip_pose(np.array(record.q_final)) + np.pad(
+        start.p_WR, (0, 5)
+    )
+    names = ("x", "y", "z", "qw", "qx", "qy", "qz")
+    np.testing.assert_allclose([getattr(record, f"final_{n}") for n in names], final, atol=1e-12)
+    assert record.min_distance < np.linalg.norm(p_WG - start.x0[8, :3])
+    assert request_of(record, BRIEF) == request
+    assert request_of(record, BRIEF).key == record.key
+    rollout._environments.clear()
+    assert comparable([run_reach(request)]) == comparable([record])
+    lone = run_reach(request, sleep=False)
+    assert lone.outcome == record.outcome
+    np.testing.assert_allclose(lone.q_final, record.q_final, atol=1e-3)
+
+
+def test_a_start_of_the_wrong_kind_is_refused() -> None:
+    p_WG = BRIEF.goals("training", 1)[6]
+    with pytest.raises(RequestError, match=r"a start of pr2 has 7 numbers \(x, y, z, qw"):
+        make_request(BRIEF, "training", 1, p_WG, np.zeros(3))
+
+
+def test_a_collection_holds_every_goal_from_every_start() -> None:
+    requests = CollectionRequest(scenario=BRIEF, environments=1).reaches(0)
+    assert len({request.key for request in requests}) == 12 * 19
+    assert {request.torso for request in requests} == {0.15}
+
+
+def test_a_recording_shows_the_robot(tmp_path: Path) -> None:
+    short = load_scenario("sphere-aperture-clutter", "{stop: {timeout_s: 0.08}}")
+    instance = short.sample_instance("training", 0)
+    p_WG, start = short.goals("training", 0)[4], find_pointing_starts(short, instance, None, 0.16)
+    environment = Environment(short, instance, p_WR=np.array([0.0, 0.01, 0.0]), torso_m=0.16)
+    result = environment.reach(p_WG, start.x0[7] + np.pad([0.0, 0.01], (0, 5)), keep_states=True)
+    assert result.outcome in ("timeout", "invalid_start")
+    recording = ReachRecording(short, instance, 0.16)
+    recording.add_reach(result.trace, p_WG)
+    recording.save(tmp_path / "pr2.html")
+    content = (tmp_path / "pr2.html").read_text(encoding="utf-8")
+    messages = b"".join(b64decode(text) for text in re.findall(r"base64,([\w+/]+=*)", content))
+    assert b"r_wrist_roll_link" in messages
+    assert b"object39" in messages
+
+
+def test_a_further_reach_finds_the_spheres_where_the_first_left_them() -> None:
+    p_WG = BRIEF.goals("training", 2)[4]
+    starts = find_pointing_starts(BRIEF, BRIEF.sample_instance("training", 2))
+    first = make_request(BRIEF, "training", 2, p_WG, starts.x0[7])
+    second = first.then(starts.x0[8], np.zeros(2), torso_m=0.16)
+    assert (second.torso, second.after[0].torso) == (0.16, 0.15)
+    record = run_reach(second)
+    assert len(record.after) == 7 + 2 + 1
+    assert request_of(record, BRIEF) == second
+    assert second.before() == first
+    assert second.key != first.then(starts.x0[8], np.zeros(2)).key
