@@ -58,7 +58,7 @@ class Neighbourhoods:
         distance = np.sum((self._scaled - scaled) ** 2, axis=1)
         if among is not None:
             distance[~among] = np.inf
-        size = min(size, len(distance) if among is None else np.count_nonzero(among))
+        size = min(size, len(distance) if among is None else int(np.count_nonzero(among)))
         found: NDArray[np.intp] = np.argpartition(distance, size - 1)[:size]
         return found
 
