@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Protocol, Self
 
 import numpy as np
@@ -55,16 +54,12 @@ class Neighbourhoods:
             size: Number of rows.
             among: Which rows to choose from, shape (n,), by default all.
         """
-        distance = np.sum((self._scaled - scaled) ** 2, axis=1)
-        if among is not None:
-            distance[~among] = np.inf
-        size = min(size, len(distance) if among is None else int(np.count_nonzero(among)))
-        found: NDArray[np.intp] = np.argpartition(distance, size - 1)[:size]
+        rows = np.arange(len(self.Z)) if among is None else np.flatnonzero(among)
+        distance = np.sum((self.in_scales(self.Z[rows]) - scaled) ** 2, axis=1)
+        if len(rows) <= size:
+            return rows
+        found: NDArray[np.intp] = rows[np.argpartition(distance, size)[:size]]
         return found
-
-    @cached_property
-    def _scaled(self) -> Vector:
-        return self.in_scales(self.Z)
 
 
 class LocalModel(Protocol):
