@@ -13,13 +13,15 @@ from pathlib import Path
 
 import numpy as np
 
-from lic_drake.estimate.features import PLANAR_LIC1
-from lic_drake.estimate.registry import make_estimator
+from lic_drake.estimate.categories import features_of
 from lic_drake.evaluate.trial import planar_arm_of
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
+from lic_drake.reach.starts import InitialConditions, make_starts
 from lic_drake.select.lic import LbfgsbSelector, LicSelector
-from lic_drake.select.situation import Situation, StartSet
+from lic_drake.select.objective import Objective
+from lic_drake.select.registry import fit_model
+from lic_drake.select.situation import Situation
 
 SCAN = (161, 181)
 """Lattice of the dense scan: y every 5 mm, phi every degree."""
@@ -37,9 +39,10 @@ def main() -> int:
     library = ExperienceLibrary(args.library)
     scenario = library.scenario()
     arm = planar_arm_of(scenario)
-    starts = StartSet(arm=arm, line=scenario.task.start_line)
-    scan = starts.scan(*SCAN)
-    rows = PLANAR_LIC1.rows(library.columns())
+    starts = make_starts(scenario, scenario.sample_instance("holdout", 0))
+    poses = starts.poses.scan(*SCAN)
+    scan = InitialConditions(poses, np.zeros((len(poses), 2)))
+    columns = library.columns()
     goals = [scenario.sample_goal("holdout", i) for i in range(args.situations)]
     lines = [
         "| estimator | optimiser | situations | no worse than every grid start, % |"
@@ -47,18 +50,16 @@ def main() -> int:
         "|---|---|---|---|---|---|---|---|",
     ]
     for name in args.estimators:
-        estimator = make_estimator(name).fit(rows.Z, rows.f, rows.environment)
-        scans = [
-            float(estimator.predict(PLANAR_LIC1.join(p_WG, scan)).probability.max())
-            for p_WG in goals
-        ]
+        model = fit_model(name, features_of(scenario.category).first, columns)
+        objectives = [Objective(model=model, p_WG=p_WG) for p_WG in goals]
+        scans = [float(np.clip(o.values(scan), 0.0, 1.0).max()) for o in objectives]
         for optimiser, kind in OPTIMISERS.items():
-            selector = kind(arm, estimator, PLANAR_LIC1, method=name)
+            selector = kind(arm, model, method=name)
             no_worse, within, shortfall, seconds = [], [], [], []
-            for p_WG, best in zip(goals, scans, strict=True):
-                chosen = selector.select(Situation(p_WG=p_WG, starts=starts))
-                value = float(selector.evaluate(p_WG, chosen.x0[None])[0])
-                grid = float(selector.evaluate(p_WG, starts.grid).max())
+            for objective, best in zip(objectives, scans, strict=True):
+                chosen = selector.select(Situation(p_WG=objective.p_WG, starts=starts))
+                value, _, _ = objective.value_and_gradient(chosen.x0, chosen.p_WR)
+                grid = float(objective.values(starts.grid).max())
                 no_worse.append(value >= grid - 1e-9)
                 within.append(np.clip(value, 0.0, 1.0) >= 0.99 * best)
                 shortfall.append(100.0 * (best - np.clip(value, 0.0, 1.0)))

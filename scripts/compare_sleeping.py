@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from lic_drake.evaluate.batch import random_requests, simulate_requests
-from lic_drake.evaluate.experiment import mcnemar
+from lic_drake.evaluate.statistics import mcnemar
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.request import ReachRecord
 from lic_drake.reach.rollout import run_reach

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from lic_drake.evaluate.batch import random_requests, simulate_requests
-from lic_drake.evaluate.experiment import mcnemar
+from lic_drake.evaluate.statistics import mcnemar
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.intervals import wilson_interval
 from lic_drake.reach.request import ReachRecord

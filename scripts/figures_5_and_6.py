@@ -17,6 +17,7 @@ from lic_drake.evaluate.trial import planar_arm_of, run_trial
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 from lic_drake.reach.starts import make_starts
+from lic_drake.select.lic import LicSelector
 from lic_drake.select.registry import make_selector
 
 
@@ -40,6 +41,8 @@ def main() -> int:
     selector = make_selector(
         args.method, planar_arm_of(scenario), library.columns(), category=args.category
     )
+    if not isinstance(selector, LicSelector):
+        parser.error(f"the figures show what LIC estimates; {args.method!r} estimates nothing")
     attempts = run_trial(scenario, selector, "evaluation", environment, p_WG, attempts=2)
     starts = make_starts(scenario, scenario.sample_instance("evaluation", environment))
     folder = args.results / "figures"

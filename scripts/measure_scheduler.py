@@ -83,7 +83,7 @@ def count_traffic(dask_scheduler: Any) -> None:
         traffic["messages"] += 1
         return message
 
-    async def counting_write(self: Any, *args: Any, **kwargs: Any) -> int:
+    async def counting_write(self: Any, *args: Any, **kwargs: Any) -> Any:
         size = await write(self, *args, **kwargs)
         traffic["messages"] += 1
         traffic["bytes"] += size
@@ -138,7 +138,7 @@ def measure_all(tasks: int) -> tuple[dict[int, Cost], dict[str, Cost]]:
     ):
         client.wait_for_workers(2)
 
-        def fill(environments: int, **grid: int) -> None:
+        def fill(environments: int, **grid: Any) -> None:
             request = CollectionRequest(scenario=scenario, environments=environments, **grid)
             collect(
                 ExperienceLibrary(Path(folder) / f"{environments}"),

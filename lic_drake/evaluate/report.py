@@ -2,7 +2,7 @@
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from lic_drake.errors import LibraryError, LicError
@@ -103,18 +103,28 @@ def write_table_files(results: Path, name: str, tables: Sequence[Table]) -> list
 
 
 def run_table_script(number: int, doc: str, arguments: Sequence[str] | None = None) -> int:
-    """Runs the script of a table: parses, writes, names the files; returns the exit code.
+    """Runs the script of a table of the paper; see `run_script`."""
+    return run_script(lambda results: write_tables(results, number), doc, arguments)
+
+
+def run_script(
+    write: Callable[[Path], list[Path]], doc: str, arguments: Sequence[str] | None = None
+) -> int:
+    """Runs a script that makes files from the records: parses, writes, names the files.
 
     Args:
-        number: Number of the table in the paper.
+        write: Takes the folder of all records, writes the files and returns them.
         doc: The script's docstring; its first line is the help.
         arguments: Command line; the process's own by default.
+
+    Returns:
+        The exit code.
     """
     parser = argparse.ArgumentParser(description=doc.splitlines()[0])
     parser.add_argument("--results", type=Path, default=RESULTS, help="folder of all records")
     args = parser.parse_args(arguments)
     try:
-        paths = write_tables(args.results, number)
+        paths = write(args.results)
     except LicError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

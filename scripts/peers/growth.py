@@ -4,14 +4,12 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from functools import partial
 from itertools import groupby
 from multiprocessing import get_context
-from unittest.mock import patch
 
 import numpy as np
 
-from lic_drake.control.taxels import planar_taxels
+from lic_drake.control.surface_taxels import make_taxels
 from lic_drake.evaluate.batch import random_requests
 from lic_drake.experience.workers import prepare_worker
 from lic_drake.reach.request import ReachRequest, is_within_reach
@@ -64,15 +62,11 @@ def taxels_table(
     """One line a density of the skin, in taxels per metre."""
     lines = []
     for density in densities:
-        taxels = partial(planar_taxels, per_metre=float(density))
-        # The density is no part of a scenario.
-        with (
-            patch("lic_drake.reach.diagram.planar_taxels", taxels),
-            patch("peers.mujoco_simulation.planar_taxels", taxels),
-        ):
-            rows = time_paired(scenario, requests, engines, clock, lambda line: None)
+        scene = replace(scenario.scene, taxels_per_m=float(density))
+        dense = replace(scenario, scene=scene)
+        rows = time_paired(dense, requests, engines, clock, lambda line: None)
         say(f"  {density} taxels per metre: {len(requests)} reaches")
-        number = taxels(scenario.arm().skin).num_taxels
+        number = make_taxels(scenario.arm(), scene.taxels_per_m).num_taxels
         lines.append([str(density), str(number), *_costs(rows, engines)])
     return make_table(["taxels per m", "taxels", *_cost_headings(engines)], lines)
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.control.mpc_controller import HapticMpcController
+from lic_drake.control.surface_taxels import make_taxels
 from lic_drake.control.tactile import ContactPatch, calc_taxel_forces
-from lic_drake.control.taxels import planar_taxels
 from lic_drake.reach.scenario import Scenario
 from peers.mujoco_scene import MujocoConfig, make_mujoco_scene
 
@@ -26,7 +26,7 @@ class MujocoSimulation:
         self.model, self._link_of = scene.model, scene.link_of
         self.data = mujoco.MjData(self.model)
         self._joints = slice(0, len(self._arm.q_min))
-        self._layout = planar_taxels(self._arm.skin)
+        self._layout = make_taxels(self._arm, scenario.scene.taxels_per_m)
         self._controller = HapticMpcController(self._arm, self._layout, scenario.mpc)
 
     def begin(self, q: Vector, p_WG: Vector) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from lic_drake.evaluate.experiment import mcnemar
+from lic_drake.evaluate.statistics import mcnemar
 from peers.timing import PARTS, Timing
 
 
