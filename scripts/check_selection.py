@@ -14,19 +14,20 @@ from pathlib import Path
 import numpy as np
 
 from lic_drake.estimate.categories import features_of
-from lic_drake.evaluate.trial import planar_arm_of
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
-from lic_drake.reach.starts import InitialConditions, make_starts
-from lic_drake.select.lic import LbfgsbSelector, LicSelector
+from lic_drake.reach.initial_conditions import InitialConditions
+from lic_drake.reach.starts import planar_starts
+from lic_drake.robots.planar import PlanarArm
 from lic_drake.select.objective import Objective
+from lic_drake.select.planar_lic import PlanarLbfgsb, PlanarLic
 from lic_drake.select.registry import fit_model
 from lic_drake.select.situation import Situation
 
 SCAN = (161, 181)
 """Lattice of the dense scan: y every 5 mm, phi every degree."""
 
-OPTIMISERS = {"MathematicalProgram": LicSelector, "L-BFGS-B": LbfgsbSelector}
+OPTIMISERS = {"MathematicalProgram": PlanarLic, "L-BFGS-B": PlanarLbfgsb}
 
 
 def main() -> int:
@@ -38,8 +39,10 @@ def main() -> int:
     args = parser.parse_args()
     library = ExperienceLibrary(args.library)
     scenario = library.scenario()
-    arm = planar_arm_of(scenario)
-    starts = make_starts(scenario, scenario.sample_instance("holdout", 0))
+    arm = scenario.arm()
+    if not isinstance(arm, PlanarArm):
+        parser.error(f"{args.library} is of another robot than the planar arm")
+    starts = planar_starts(scenario, scenario.sample_instance("holdout", 0))
     poses = starts.poses.scan(*SCAN)
     scan = InitialConditions(poses, np.zeros((len(poses), 2)))
     columns = library.columns()
@@ -58,7 +61,7 @@ def main() -> int:
             no_worse, within, shortfall, seconds = [], [], [], []
             for objective, best in zip(objectives, scans, strict=True):
                 chosen = selector.select(Situation(p_WG=objective.p_WG, starts=starts))
-                value, _, _ = objective.value_and_gradient(chosen.x0, chosen.p_WR)
+                value, _, _ = objective.value_and_gradient(chosen.x0, np.zeros(3))
                 grid = float(objective.values(starts.grid).max())
                 no_worse.append(value >= grid - 1e-9)
                 within.append(np.clip(value, 0.0, 1.0) >= 0.99 * best)

@@ -13,7 +13,7 @@ from lic_drake.errors import LicError
 from lic_drake.evaluate.attempt_figures import densities_figure, snapshots_figure
 from lic_drake.evaluate.plots import save_figure
 from lic_drake.evaluate.report import RESULTS, load_trials
-from lic_drake.evaluate.trial import planar_arm_of, run_trial
+from lic_drake.evaluate.trial import run_trial
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 from lic_drake.reach.starts import make_starts
@@ -38,9 +38,7 @@ def main() -> int:
         pair for pair, rows in trials.items() if len(rows) == 2 and rows[1].success
     )
     p_WG = scenario.sample_goal("evaluation", environment, goal)
-    selector = make_selector(
-        args.method, planar_arm_of(scenario), library.columns(), category=args.category
-    )
+    selector = make_selector(args.method, scenario.arm(), library.columns(), category=args.category)
     if not isinstance(selector, LicSelector):
         parser.error(f"the figures show what LIC estimates; {args.method!r} estimates nothing")
     attempts = run_trial(scenario, selector, "evaluation", environment, p_WG, attempts=2)

@@ -37,7 +37,7 @@ def main() -> int:
             p_WG = scenario.sample_goal(args.stream, at, goal)
             requests += [
                 make_request(scenario, args.stream, environment, p_WG, x0, p_WR)
-                for x0, p_WR in zip(*grid, strict=True)
+                for x0, p_WR in zip(grid.x0, grid.p_WR, strict=True)
             ]
     library = ExperienceLibrary(args.out / args.scenario / "factorial")
     library.create()

@@ -56,11 +56,13 @@ def add_method_argument(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_library_argument(parser: argparse.ArgumentParser) -> None:
+def add_library_argument(
+    parser: argparse.ArgumentParser, default: str = "the shipped one for cylinder-clutter"
+) -> None:
     """Adds --library, what strategies learn from."""
     parser.add_argument(
         "--library",
         type=Path,
         metavar="FOLDER",
-        help="experience library (default: the shipped one for cylinder-clutter)",
+        help=f"experience library (default: {default})",
     )

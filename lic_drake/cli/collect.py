@@ -101,11 +101,16 @@ def run(args: argparse.Namespace) -> int:
 
     request = _make_request(args)
     shard = Shard.parse(args.shard)
-    environments = len(shard.share(request.environment_indices))
-    goals, starts = len(request.goals()), len(request.starts().x0)
+    indices = shard.share(request.environment_indices)
+    goals, starts, total = (
+        len(request.goals()),
+        len(request.starts()),
+        request.num_reaches(indices),
+    )
+    about = "" if total == len(indices) * goals * starts else "about "
     print(
-        f"{request.scenario.category}: {environments} environments x {goals} goals x"
-        f" {starts} starts = {environments * goals * starts} reaches into {args.library}",
+        f"{request.scenario.category}: {len(indices)} environments x {goals} goals x"
+        f" {about}{starts} starts = {total} reaches into {args.library}",
         flush=True,
     )
     try:

@@ -1,7 +1,8 @@
-"""`lic demo`: select with LIC-1, reach, record."""
+"""`lic demo`: select with LIC, reach, record."""
 
 import argparse
 from pathlib import Path
+from typing import NamedTuple
 
 from lic_drake.cli.arguments import (
     Subparsers,
@@ -11,16 +12,36 @@ from lic_drake.cli.arguments import (
 )
 
 
+class _Demonstration(NamedTuple):
+    """What a robot shows unless told otherwise."""
+
+    category: str
+    overrides: str
+
+
+_DEMONSTRATIONS = {
+    "planar-arm": _Demonstration("cylinder-clutter", ""),
+    "pr2": _Demonstration("sphere-aperture-clutter", "{clutter: {num_blocked: 8}}"),
+}
+
+
 def add_parser(subparsers: Subparsers) -> None:
     """Adds the subcommand to the command line."""
     parser = subparsers.add_parser(
         "demo",
         help="select a start from past experience, reach into unseen clutter, record it",
         description="Draws an environment that is in no library, selects a start pose from the"
-        " shipped experience library, reaches, and tries once more from elsewhere if that fails."
-        " Writes demo.html (a recording that plays offline), density.png (estimated success over"
-        " the starts), path.png (view from above) and demo.json.",
-        epilog="example: lic demo --seed 7 --method knn --out out",
+        " shipped experience library, reaches, and tries once more if that fails. Writes demo.html"
+        " (a recording that plays offline), path.png, demo.json and the estimated success over the"
+        " starts: density.png in the plane, apertures.png for the PR2.",
+        epilog="examples: lic demo --seed 7 --method knn --out out; lic demo --robot pr2 --seed 3",
+    )
+    parser.add_argument(
+        "--robot",
+        choices=tuple(_DEMONSTRATIONS),
+        default="planar-arm",
+        help="planar-arm among cylinders, or pr2 before a board with blocked apertures (default:"
+        " %(default)s)",
     )
     parser.add_argument(
         "--seed",
@@ -30,7 +51,13 @@ def add_parser(subparsers: Subparsers) -> None:
         help="chooses environment and goal (default: 0)",
     )
     add_method_argument(parser)
-    add_library_argument(parser)
+    add_library_argument(parser, "the shipped one for the robot")
+    parser.add_argument(
+        "--set",
+        metavar="YAML",
+        help="values put over the library's scenario (default: none; for pr2"
+        f' "{_DEMONSTRATIONS["pr2"].overrides}")',
+    )
     parser.add_argument(
         "--out", type=Path, default=Path("out"), help="folder to write to (default: %(default)s)"
     )
@@ -40,11 +67,16 @@ def add_parser(subparsers: Subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Runs the subcommand and returns the exit code."""
     from lic_drake.evaluate.demonstration import demonstrate
+    from lic_drake.experience.schema import scenario_text
     from lic_drake.experience.store import ExperienceLibrary
     from lic_drake.paths import shipped_library
+    from lic_drake.reach.scenario import parse_scenario
 
-    library = ExperienceLibrary(args.library or shipped_library("cylinder-clutter"))
-    result = demonstrate(library.scenario(), library, args.method, args.seed, args.out)
+    usual = _DEMONSTRATIONS[args.robot]
+    library = ExperienceLibrary(args.library or shipped_library(usual.category))
+    overrides = usual.overrides if args.set is None else args.set
+    scenario = parse_scenario(scenario_text(library.scenario()), overrides, source="--set")
+    result = demonstrate(scenario, library, args.method, args.seed, args.out)
     for kind, path in result.files.items():
         print(f"{kind}: {path}")
     return 0

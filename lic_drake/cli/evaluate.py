@@ -69,6 +69,18 @@ def add_parser(subparsers: Subparsers) -> None:
         " before left it)",
     )
     parser.add_argument(
+        "--set",
+        default="",
+        metavar="YAML",
+        help="values put over the library's scenario for what is tried, for instance"
+        ' "{clutter: {num_blocked: 10}}" (default: none)',
+    )
+    parser.add_argument(
+        "--still",
+        action="store_true",
+        help="keep base and torso of a PR2 where they are (default: they move along the board)",
+    )
+    parser.add_argument(
         "--variant",
         default="",
         metavar="NAME",
@@ -97,6 +109,8 @@ def run(args: argparse.Namespace) -> int:
         second_attempts=args.second_attempts,
         fresh=args.fresh,
         variant=args.variant,
+        overrides=args.set,
+        moves=not args.still,
     )
     table = TrialTable(run_evaluation(evaluation, args.workers))
     print(format_rates(summarize_trials(table, args.attempts, args.variant)), end="")

@@ -53,7 +53,6 @@ def run(args: argparse.Namespace) -> int:
     """Runs the subcommand and returns the exit code."""
     import numpy as np
 
-    from lic_drake.evaluate.trial import planar_arm_of
     from lic_drake.experience.store import ExperienceLibrary
     from lic_drake.paths import shipped_library
     from lic_drake.reach.request import check_goal
@@ -65,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     library = ExperienceLibrary(args.library or shipped_library("cylinder-clutter"))
     scenario = library.scenario()
     p_WG = np.array([*args.goal, 0.0])
-    arm = planar_arm_of(scenario)
+    arm = scenario.arm()
     starts = make_starts(scenario, scenario.sample_instance("evaluation", args.seed))
     bases = starts.grid.p_WR
     nearest = bases[np.argmin(np.linalg.norm(bases - p_WG[:2], axis=1))]

@@ -100,6 +100,22 @@ class SphereApertureClutter:
             p_WA=np.delete(p_WA, blocked, axis=0),
         )
 
+    def bare_board(self) -> ClutterInstance:
+        """Returns the board alone with no aperture blocked: all that is known beforehand."""
+        p_WA = self.aperture_centres()
+        p_WB, edges = self._board(np.empty((0, 3)))
+        k = len(p_WB)
+        return ClutterInstance(
+            category="sphere-aperture-clutter",
+            shape=("box",) * k,
+            size=edges,
+            p_WO=p_WB,
+            yaw=np.zeros(k),
+            mass=np.ones(k),
+            movable=np.zeros(k, dtype=bool),
+            p_WA=p_WA,
+        )
+
     def aperture_centres(self) -> NDArray[np.float64]:
         """Returns the centres of all apertures, shape (rows * columns, 3); y varies fastest."""
         y = self.aperture_m * (np.arange(self.columns) - 0.5 * (self.columns - 1))

@@ -6,7 +6,7 @@ A new category is one line here.
 from dataclasses import dataclass, replace
 
 from lic_drake.estimate.checks import EstimateError
-from lic_drake.estimate.features import PLANAR_LIC1, FeatureMap
+from lic_drake.estimate.features import PLANAR_LIC1, SPACE_LIC1, FeatureMap
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,3 +60,4 @@ register_category(
     "passage-clutter", PLANAR_LIC1, (*_FIRST_START, "first_final_vx", "first_final_vy")
 )
 register_category("cylinder-aperture-clutter", PLANAR_LIC1, _FIRST_START)
+register_category("sphere-aperture-clutter", SPACE_LIC1, ("first_start_y", "first_start_z"))

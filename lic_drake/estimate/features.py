@@ -11,7 +11,9 @@ from lic_drake.estimate.checks import EstimateError, Vector
 from lic_drake.experience.second_reach import FIRST_PREFIX, SHOWN
 
 _GOAL = ("goal_x", "goal_y", "goal_z")
-_START = ("start_x", "start_y", "start_phi")
+_IN_PLANE = ("start_x", "start_y", "start_phi")
+_IN_SPACE = ("start_x", "start_y", "start_z", "start_qw", "start_qx", "start_qy", "start_qz")
+_START = (*_IN_PLANE, *_IN_SPACE[2:])
 _OBSERVED = tuple(FIRST_PREFIX + name for name in SHOWN)
 
 
@@ -35,15 +37,16 @@ class FeatureMap:
     """Which columns of the records make up z: first the situation, then the decision.
 
     Positions are those in the robot's frame R, which has the axes of the world W and its origin
-    at the base: the translation T_b0 of paper Eq. (3). Angles and velocities are the same in both.
+    at b0, the base's place and the torso's height: the translation T_b0 of paper Eq. (3). Angles
+    and velocities are the same in both.
 
     Attributes:
         goal: Columns of the goal p_WG, a part of goal_x, goal_y, goal_z, metres.
         start: Columns of the initial condition x0 that the robot chooses, a part of start_x,
-            start_y, start_phi, metres and radians.
-        observed: Columns of what the first reach showed, for LIC-2: a part of first_start_x,
-            first_start_y, first_start_phi, first_final_x, first_final_y, first_final_phi,
-            first_final_vx, first_final_vy, metres, radians and m/s.
+            start_y, start_phi, or in space of start_x, start_y, start_z and the quaternion
+            start_qw, start_qx, start_qy, start_qz, metres and radians.
+        observed: Columns of what the first reach showed, for LIC-2: "first_" before names of
+            `lic_drake.experience.second_reach.SHOWN`, metres, radians and m/s.
     """
 
     goal: tuple[str, ...]
@@ -61,6 +64,13 @@ class FeatureMap:
                 raise EstimateError(
                     f"{kind} features must be some of {', '.join(known)}, each once, got {names}"
                 )
+        if "start_phi" in self.start and self.in_space:
+            raise EstimateError(f"start features are of the plane or of space, got {self.start}")
+
+    @property
+    def in_space(self) -> bool:
+        """Whether hand poses are positions and quaternions."""
+        return not set(self.start) <= set(_IN_PLANE)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -86,7 +96,7 @@ class FeatureMap:
         Args:
             columns: Arrays of equal length named as the fields of `ReachRecord`; with observed
                 features those of `lic_drake.experience.second_reach.pair_reaches`. Without
-                base_x and base_y the base stands at the origin.
+                base_x, base_y and torso they are 0.
 
         Raises:
             EstimateError: A column is missing.
@@ -101,10 +111,10 @@ class FeatureMap:
         streams, stream = np.unique(columns["stream"].astype(str), return_inverse=True)
         environment = columns["environment"].astype(np.int64) * len(streams) + stream
         origin = np.zeros(len(environment))
-        base = np.column_stack([columns.get(name, origin) for name in ("base_x", "base_y")])
+        b0 = np.column_stack([columns.get(name, origin) for name in ("base_x", "base_y", "torso")])
         Z = np.column_stack([np.asarray(columns[name], dtype=float) for name in self.names])
         return ExperienceRows(
-            Z=Z - base @ self._base_selection(self.names).T,
+            Z=Z - b0 @ self._base_selection(self.names).T,
             f=np.asarray(columns["success"], dtype=float),
             environment=environment,
         )
@@ -114,7 +124,8 @@ class FeatureMap:
 
         Args:
             p_RG: Goal in the robot's frame, shape (..., 3), metres.
-            x0: Initial condition (x, y, phi) in it, shape (..., 3), metres and radians.
+            x0: Initial condition in it, (x, y, phi), shape (..., 3), or position and quaternion,
+                shape (..., 7), metres and radians.
             observed: The observed features in it, shape (..., k), see `observation`; by default
                 there are none.
 
@@ -133,13 +144,14 @@ class FeatureMap:
         parts = [np.broadcast_to(part, shape + part.shape[-1:]) for part in (goal, seen, start)]
         return np.concatenate(parts, axis=-1)
 
-    def observation(self, first: Mapping[str, float], base: ArrayLike = (0.0, 0.0)) -> Vector:
+    def observation(self, first: Mapping[str, float], b0: ArrayLike = (0.0, 0.0, 0.0)) -> Vector:
         """Returns the observed features in the frame of a robot about to make its second reach.
 
         Args:
-            first: What the first reach showed, in W: start_x, start_y, start_phi, final_x,
-                final_y, final_phi, final_vx, final_vy, metres, radians and m/s.
-            base: Position p_WR of the base in the second reach, shape (2,), metres.
+            first: What the first reach showed, in W, by the names of
+                `lic_drake.experience.second_reach.SHOWN`, metres, radians and m/s.
+            b0: Place (x, y) of the base and height of the torso in the second reach, shape (3,),
+                metres.
 
         Returns:
             Shape (k,), in the order of `observed`.
@@ -153,21 +165,21 @@ class FeatureMap:
                 f"the first reach shows no {self.observed[np.argmin(np.isfinite(seen))]}, as if it"
                 " never began; choose the second start as a first one"
             )
-        moved = self._base_selection(self.observed) @ np.asarray(base, dtype=float)
+        moved = self._base_selection(self.observed) @ np.asarray(b0, dtype=float)
         observed: Vector = np.array(seen) - moved
         return observed
 
     def gradient_by_x0(self, gradient: Vector) -> Vector:
-        """Returns a gradient by x0 = (x, y, phi), shape (3,), from one by z, shape (d,).
+        """Returns a gradient by x0, shape (3,) or in space (7,), from one by z, shape (d,).
 
         Components of x0 that are no feature get zero.
         """
-        by_x0 = np.zeros(len(_START))
+        by_x0 = np.zeros(len(self._pose_names))
         by_x0[self._start_indices()] = gradient[self.decision]
         return by_x0
 
     def gradient_by_base(self, gradient: Vector) -> Vector:
-        """Returns a gradient by the base's position, shape (2,), from one by z, shape (d,).
+        """Returns a gradient by b0 = (x, y, torso), shape (3,), from one by z, shape (d,).
 
         Goal, first reach and start stand still in the world, so that every position in z moves
         by minus what the base moves.
@@ -176,14 +188,24 @@ class FeatureMap:
         return by_base
 
     def _start_indices(self) -> list[int]:
-        return [_START.index(name) for name in self.start]
+        return [self._pose_names.index(name) for name in self.start]
+
+    @property
+    def _pose_names(self) -> tuple[str, ...]:
+        return _IN_SPACE if self.in_space else _IN_PLANE
 
     @staticmethod
     def _base_selection(names: tuple[str, ...]) -> Vector:
-        """Returns the matrix that takes the base's position out of features, shape (d, 2)."""
-        moved = [[name.endswith("_x"), name.endswith("_y")] for name in names]
-        return np.array(moved, dtype=float).reshape(-1, 2)
+        """Returns the matrix that takes b0 out of features, shape (d, 3)."""
+        moved = [[name.endswith(axis) for axis in ("_x", "_y", "_z")] for name in names]
+        return np.array(moved, dtype=float).reshape(-1, 3)
 
 
 PLANAR_LIC1 = FeatureMap(goal=("goal_x", "goal_y"), start=("start_y", "start_phi"))
 """LIC-1 in the plane; x is the same all along the start line, so it is no feature."""
+
+SPACE_LIC1 = FeatureMap(goal=("goal_y", "goal_z"), start=("start_y", "start_z", "start_qx"))
+"""LIC-1 in space, where tools start in a plane across x, point along it, and goals lie in another.
+
+Of the quaternion only the roll about x is then left, and the sine of half its angle says it all.
+"""

@@ -37,7 +37,10 @@ def snapshots_figure(attempts: Sequence[Attempt]) -> Figure:
 
 
 def densities_figure(
-    selector: LicSelector, starts: Starts, p_WG: Vector, attempts: Sequence[Attempt]
+    selector: LicSelector,
+    starts: Starts,
+    p_WG: Vector,
+    attempts: Sequence[Attempt],
 ) -> Figure:
     """Returns the estimated success of all starts before each attempt, on one scale (Fig. 6).
 
@@ -53,9 +56,9 @@ def densities_figure(
         failed = tuple(FailedReach.from_record(a.record) for a in attempts[: number - 1])
         situation = Situation(p_WG=p_WG, starts=starts, failed=failed)
         chosen = attempt.selection
-        region = find_region(starts.regions, chosen.x0, chosen.p_WR)
+        region = find_region(situation.planar_starts.regions, chosen.x0, chosen.p_WR)
         assert region is not None  # Selections lie in one.
-        conditions, shape = density_lattice(starts, region)
+        conditions, shape = density_lattice(situation.planar_starts, region)
         probability = estimate_density(selector, situation, conditions)
         x0 = chosen.x0 - [*chosen.p_WR, 0.0]
         draw_density(ax, conditions.in_R, probability, shape, [(f"attempt {number}", x0)])

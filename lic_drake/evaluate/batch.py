@@ -37,7 +37,15 @@ def random_requests(
             rng = make_generator(stream, "rnd", environment, goal)
             i = rng.integers(len(starts.x0))
             requests.append(
-                make_request(scenario, stream, environment, p_WG, starts.x0[i], starts.p_WR[i])
+                make_request(
+                    scenario,
+                    stream,
+                    environment,
+                    p_WG,
+                    starts.x0[i],
+                    starts.p_WR[i],
+                    float(starts.torso_m[i]),
+                )
             )
     return requests
 

@@ -8,20 +8,17 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from lic_drake.errors import LicError
-from lic_drake.evaluate.attempt_figures import densities_figure
-from lic_drake.evaluate.plots import draw_top_view, save_figure
-from lic_drake.evaluate.trial import Attempt, planar_arm_of, run_trial
+from lic_drake.evaluate.pictures import AperturePictures, Pictures, PlanarPictures
+from lic_drake.evaluate.trial import Attempt, run_trial
 from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.reach.recording import ReachRecording
-from lic_drake.reach.request import ReachRecord, ReachRequest, is_within_reach
+from lic_drake.reach.pointing_starts import PointingStarts
+from lic_drake.reach.request import IN_PLANE, ReachRecord, ReachRequest, is_within_reach
 from lic_drake.reach.rollout import make_record, simulate_request
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.starts import Starts, make_starts
-from lic_drake.reach.trace import ReachTrace
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.registry import Selector, make_selector, needs_library
 from lic_drake.select.situation import Selection, Situation
@@ -36,7 +33,7 @@ class Demonstration:
     Attributes:
         p_WG: Goal, shape (3,), metres.
         attempts: The attempts in their order.
-        files: What was written, by kind: recording, density, path, data.
+        files: What was written, by kind: recording, pictures and data.
     """
 
     p_WG: Vector
@@ -60,7 +57,8 @@ def demonstrate(
         library: Experience to learn from; its environments come from another seed stream.
         method: Strategy, see `lic_drake.select.registry.method_names`.
         seed: Chooses the environment and the goal.
-        out: Folder for demo.html, density.png, path.png and demo.json.
+        out: Folder for demo.html, demo.json and, in the plane, density.png and path.png, before a
+            board of apertures apertures.png and path.png.
         attempts: How many reaches at the most.
         say: Gets a line for every step.
 
@@ -69,7 +67,7 @@ def demonstrate(
     """
     needs_library(method)
     _make_folder(out)
-    arm = planar_arm_of(scenario)
+    arm = scenario.arm()
     instance = scenario.sample_instance("evaluation", seed)
     starts = make_starts(scenario, instance)
     draws = (scenario.sample_goal("evaluation", seed, index) for index in itertools.count())
@@ -77,51 +75,34 @@ def demonstrate(
     columns = library.columns()
     say(
         f"{scenario.category}, evaluation environment {seed}: goal at"
-        f" ({p_WG[0]:.3f}, {p_WG[1]:.3f}) m; learning from {library.num_reaches} reaches"
+        f" {_metres(p_WG[: instance.num_axes])} m; learning from {library.num_reaches} reaches"
     )
     selector = _Talking(
         make_selector(method, arm, columns, np.random.default_rng(seed), scenario.category), say
     )
-    recording = ReachRecording(scenario, instance)
-    traces: list[ReachTrace] = []
+    if isinstance(starts, PointingStarts):
+        pictures: Pictures = AperturePictures(scenario, instance, starts, p_WG)
+    else:
+        pictures = PlanarPictures(scenario, instance, starts, p_WG)
 
     def reach(request: ReachRequest) -> ReachRecord:
         began = time.perf_counter()
         result = simulate_request(request, keep_states=True)
         record = make_record(request, result, time.perf_counter() - began)
-        recording.add_reach(result.trace, p_WG)
-        traces.append(result.trace)
+        pictures.add(request, record, result.trace)
         say(
-            f"attempt {len(traces)}: {record.outcome} after {record.duration_s:.1f} s, nearest to"
-            f" the goal {1000 * record.min_distance:.0f} mm, peak force {record.peak_force:.1f} N,"
-            f" simulated in {record.wall_time_s:.1f} s"
+            f"attempt {pictures.num_attempts}: {record.outcome} after {record.duration_s:.1f} s,"
+            f" nearest to the goal {1000 * record.min_distance:.0f} mm, peak force"
+            f" {record.peak_force:.1f} N, simulated in {record.wall_time_s:.1f} s"
         )
         return record
 
     done = run_trial(scenario, selector, "evaluation", seed, p_WG, attempts, reach=reach)
-
-    files = {
-        "recording": out / "demo.html",
-        "density": out / "density.png",
-        "path": out / "path.png",
-        "data": out / "demo.json",
-    }
-    recording.save(files["recording"])
-    labels = [f"{_ordinal(i)} start: {a.record.outcome}" for i, a in enumerate(done)]
     chosen = selector.selector
     if not isinstance(chosen, LicSelector):  # Shows what LIC would have thought of the choices.
         chosen = make_selector("gp", arm, columns, category=scenario.category)
     assert isinstance(chosen, LicSelector)
-    save_figure(densities_figure(chosen, starts, p_WG, done), files["density"])
-    figure = Figure(figsize=(7, 7))
-    draw_top_view(
-        figure.subplots(),
-        scenario,
-        instance,
-        p_WG,
-        list(zip(labels, traces, strict=True)),
-    )
-    save_figure(figure, files["path"])
+    files = {**pictures.save(out, chosen, done), "data": out / "demo.json"}
     demonstration = Demonstration(p_WG=p_WG, attempts=done, files=files)
     _write_json(demonstration, method, seed)
     return demonstration
@@ -147,19 +128,33 @@ class _Talking:
             if selection.probability is None
             else f", estimated success {100 * selection.probability:.0f} %"
         )
-        base = f", base at y {selection.p_WR[1]:+.3f} m" if np.any(selection.p_WR) else ""
         self.say(
-            f"attempt {len(situation.failed) + 1}: {self.method} starts at y"
-            f" {selection.x0[1]:+.3f} m, phi {np.rad2deg(selection.x0[2]):+.1f}"
-            f" degrees{base}{estimate} (chosen in {selection.seconds:.2f} s)"
+            f"attempt {len(situation.failed) + 1}: {self.method} starts at"
+            f" {_start(selection)}{estimate} (chosen in {selection.seconds:.2f} s)"
         )
         return selection
 
 
+def _start(selection: Selection) -> str:
+    """Returns an initial condition in words."""
+    base = f", base at y {selection.p_WR[1]:+.3f} m" if np.any(selection.p_WR) else ""
+    if len(selection.x0) == IN_PLANE:
+        phi = np.rad2deg(selection.x0[2])
+        return f"y {selection.x0[1]:+.3f} m, phi {phi:+.1f} degrees{base}"
+    aperture = f"the aperture at {_metres(selection.x0[:3])} m"
+    return f"{aperture}{base}, torso at {selection.torso_m:.3f} m"
+
+
+def _metres(position: Vector) -> str:
+    return "(" + ", ".join(f"{value:.3f}" for value in position) + ")"
+
+
 def _can_be_reached(scenario: Scenario, starts: Starts, p_WG: Vector) -> bool:
-    """Tells whether a goal is near enough to one of the places where the base may stand."""
-    bases = np.unique(starts.grid.p_WR, axis=0)
-    return any(is_within_reach(scenario, p_WG - [*base, 0.0]) for base in bases)
+    """Tells whether a goal is near enough to one of the places where base and torso may be."""
+    return any(
+        is_within_reach(scenario, p_WG - [x, y, 0.0], torso_m)
+        for x, y, torso_m in np.unique(starts.grid.b0, axis=0)
+    )
 
 
 def _make_folder(out: Path) -> None:
@@ -193,7 +188,3 @@ def _write_json(result: Demonstration, method: str, seed: int) -> None:
         "files": {kind: str(path) for kind, path in result.files.items()},
     }
     result.files["data"].write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
-
-
-def _ordinal(index: int) -> str:
-    return ("first", "second", "third", "fourth", "fifth")[index]

@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from lic_drake.reach.starts import InitialConditions, Region, Starts
+from lic_drake.reach.initial_conditions import InitialConditions
+from lic_drake.reach.starts import PlanarStarts, Region
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.situation import Situation
 
@@ -13,7 +14,9 @@ DENSITY_SHAPE = (81, 91)
 """Lattice of a density: y every 1 cm, phi every 2 degrees."""
 
 
-def density_lattice(starts: Starts, region: Region) -> tuple[InitialConditions, tuple[int, int]]:
+def density_lattice(
+    starts: PlanarStarts, region: Region
+) -> tuple[InitialConditions, tuple[int, int]]:
     """Returns initial conditions over a whole start line, possible or not, and their shape.
 
     Where the base moves, the hand is in the centre of an aperture and the base varies; relative to
@@ -43,7 +46,7 @@ def estimate_density(
     selector: LicSelector, situation: Situation, conditions: InitialConditions
 ) -> Vector:
     """Returns the estimates at n initial conditions, shape (n,), NaN where the arm cannot start."""
-    arm = situation.starts.poses.arm
+    arm = situation.planar_starts.poses.arm
     possible = np.array([arm.solve_ik(x0) is not None for x0 in conditions.in_R])
     density = np.full(len(possible), np.nan)
     objective = selector.objective(situation)

@@ -10,13 +10,15 @@ from pathlib import Path
 import numpy as np
 
 from lic_drake.errors import LibraryError, LicError
-from lic_drake.evaluate.trial import Attempt, planar_arm_of, run_trial
+from lic_drake.evaluate.trial import Attempt, run_trial
 from lic_drake.evaluate.trials import TrialRow, read_trials, write_trials
 from lic_drake.experience.real_pairs import pair_real_attempts
+from lic_drake.experience.schema import scenario_text
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.experience.workers import prepare_worker
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.rollout import run_reach
+from lic_drake.reach.scenario import Scenario, parse_scenario
 from lic_drake.seeds import make_generator
 from lic_drake.select.baselines import RandomSelector
 from lic_drake.select.registry import (
@@ -50,6 +52,9 @@ class Evaluation:
         common_goals: Whether all environments have the goals of the first one.
         second_attempts: Library of real second attempts that LIC-2 learns from; None: D2 is made
             from single reaches, as in the paper.
+        overrides: YAML text put over the library's scenario: what is tried may differ from what
+            was learned from, for instance by apertures that are blocked.
+        moves: Whether a PR2 may move base and torso before a reach.
     """
 
     experience: Path
@@ -64,6 +69,8 @@ class Evaluation:
     variant: str = ""
     common_goals: bool = False
     second_attempts: Path | None = None
+    overrides: str = ""
+    moves: bool = True
 
     @property
     def trials_path(self) -> Path:
@@ -74,6 +81,17 @@ class Evaluation:
     def reaches(self) -> ExperienceLibrary:
         """The reaches of all attempts."""
         return ExperienceLibrary(self.results / "reaches")
+
+    def scenario(self) -> Scenario:
+        """Returns the scenario that is tried.
+
+        Raises:
+            LicError: The library cannot be read, or an override does not fit.
+        """
+        scenario = ExperienceLibrary(self.experience).scenario()
+        if not self.overrides:
+            return scenario
+        return parse_scenario(scenario_text(scenario), self.overrides, source="--set")
 
 
 def run_evaluation(
@@ -97,14 +115,14 @@ def run_evaluation(
     """
     for method in evaluation.methods:
         check_method(method)
-    scenario = ExperienceLibrary(evaluation.experience).scenario()
-    planar_arm_of(scenario)
+    scenario = evaluation.scenario()
     library = evaluation.reaches
     library.create()
     if library.shard_paths() and library.header().scenario_digest != scenario.digest:
         raise LibraryError(
-            f"{library.path} holds reaches of another scenario than {evaluation.experience};"
-            " choose another folder for the results"
+            f"{library.path} holds reaches of another scenario than the one to be tried"
+            f" ({evaluation.experience}, {evaluation.overrides or 'as it is'}); choose another"
+            " folder for the results"
         )
     blocks = _blocks(evaluation)
     # Threads of linear algebra in this process would be inherited by nobody and help nobody.
@@ -168,7 +186,7 @@ class _Worker:
     def __init__(self, evaluation: Evaluation) -> None:
         self._evaluation = evaluation
         experience = ExperienceLibrary(evaluation.experience)
-        self.scenario = experience.scenario()
+        self.scenario = evaluation.scenario()
         self._columns = experience.columns()
         self._pairs = None
         if evaluation.second_attempts is not None:
@@ -195,6 +213,7 @@ class _Worker:
                         p_WG,
                         evaluation.attempts,
                         fresh=evaluation.fresh,
+                        moves=evaluation.moves,
                         reach=self._reach,
                     )
                     yield method, environment, goal, attempts
@@ -214,7 +233,7 @@ class _Worker:
         if method not in self._selectors:
             self._selectors[method] = make_selector(
                 method,
-                planar_arm_of(self.scenario),
+                self.scenario.arm(),
                 self._columns if needs_library(method) else None,
                 category=self.scenario.category,
                 pairs=self._pairs,

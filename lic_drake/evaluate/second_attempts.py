@@ -5,7 +5,6 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from lic_drake.evaluate.batch import simulate_requests
-from lic_drake.evaluate.trial import planar_arm_of
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.request import ReachRequest, make_request
 from lic_drake.reach.starts import make_starts
@@ -39,7 +38,7 @@ def collect_second_attempts(
     """
     scenario = experience.scenario()
     selector = make_selector(
-        method, planar_arm_of(scenario), experience.columns(), category=scenario.category
+        method, scenario.arm(), experience.columns(), category=scenario.category
     )
     firsts: list[ReachRequest] = []
     for environment in environments:
@@ -47,7 +46,9 @@ def collect_second_attempts(
         for p_WG in scenario.goals("training", environment):
             chosen = selector.select(Situation(p_WG=p_WG, starts=starts))
             firsts.append(
-                make_request(scenario, "training", environment, p_WG, chosen.x0, chosen.p_WR)
+                make_request(
+                    scenario, "training", environment, p_WG, chosen.x0, chosen.p_WR, chosen.torso_m
+                )
             )
     output.create()
     say(f"{len(firsts)} first attempts chosen")
@@ -59,6 +60,9 @@ def collect_second_attempts(
             continue
         instance = scenario.sample_instance("training", first.environment)
         grid = make_starts(scenario, instance).grid
-        seconds += [first.then(x0, p_WR) for x0, p_WR in zip(*grid, strict=True)]
+        seconds += [
+            first.then(x0, p_WR, torso_m)
+            for x0, p_WR, torso_m in zip(grid.x0, grid.p_WR, grid.torso_m, strict=True)
+        ]
     simulate_requests(seconds, output, scenario, workers, say)
     return len(seconds)

@@ -3,12 +3,10 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from lic_drake.errors import RequestError
 from lic_drake.reach.request import ReachRecord, ReachRequest, make_request
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.starts import make_starts
-from lic_drake.robots.planar import PlanarArm
 from lic_drake.select.registry import Selector
 from lic_drake.select.situation import FailedReach, Selection, Situation, Vector
 
@@ -22,18 +20,6 @@ class Attempt:
     record: ReachRecord
 
 
-def planar_arm_of(scenario: Scenario) -> PlanarArm:
-    """Returns the scenario's robot, which must be a planar arm.
-
-    Raises:
-        RequestError: It is another robot.
-    """
-    arm = scenario.arm()
-    if not isinstance(arm, PlanarArm):
-        raise RequestError(f"selection knows the planar arm only, not {scenario.robot!r}")
-    return arm
-
-
 def run_trial(
     scenario: Scenario,
     selector: Selector,
@@ -43,6 +29,7 @@ def run_trial(
     attempts: int,
     *,
     fresh: bool = False,
+    moves: bool = True,
     reach: Callable[[ReachRequest], ReachRecord] = run_reach,
 ) -> list[Attempt]:
     """Selects and reaches until the goal is reached or the attempts are used up.
@@ -56,18 +43,25 @@ def run_trial(
         attempts: How many reaches at the most.
         fresh: Whether every attempt finds the environment as it was drawn; otherwise it finds it
             as the attempt before left it, as on a real robot.
+        moves: Whether a PR2 may move base and torso before a reach.
         reach: Makes a request's reach.
     """
-    starts = make_starts(scenario, scenario.sample_instance(stream, environment))
+    starts = make_starts(scenario, scenario.sample_instance(stream, environment), moves)
     done: list[Attempt] = []
     for _ in range(attempts):
         failed = tuple(FailedReach.from_record(attempt.record) for attempt in done)
         selection = selector.select(Situation(p_WG=p_WG, starts=starts, failed=failed))
         if done and not fresh:
-            request = done[-1].request.then(selection.x0, selection.p_WR)
+            request = done[-1].request.then(selection.x0, selection.p_WR, selection.torso_m)
         else:
             request = make_request(
-                scenario, stream, environment, p_WG, selection.x0, selection.p_WR
+                scenario,
+                stream,
+                environment,
+                p_WG,
+                selection.x0,
+                selection.p_WR,
+                selection.torso_m,
             )
         done.append(Attempt(selection=selection, request=request, record=reach(request)))
         if done[-1].record.success:

@@ -156,9 +156,8 @@ class _Collection:
         self._began = time.monotonic()
         held = _held(library, request.stream)
         digest = request.scenario.digest
-        num_reaches = len(request.goals()) * len(request.starts().x0)
         environments = shard.share(request.environment_indices)
-        self._total = num_reaches * len(environments)
+        self._total = request.num_reaches(environments)
         self._stored = self._stored_successes = 0
         self._states: list[TaskState] = []
         for environment in environments:

@@ -3,6 +3,7 @@
 The paper tries every start condition with every goal in every training environment (IV-A).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,9 +15,10 @@ from numpy.typing import NDArray
 from lic_drake.errors import LibraryError, RequestError
 from lic_drake.experience.files import readable_errors, write_atomically
 from lic_drake.experience.schema import scenario_text
+from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.reach.request import ReachRequest, make_request
 from lic_drake.reach.scenario import Scenario, parse_scenario
-from lic_drake.reach.starts import InitialConditions, training_starts
+from lic_drake.reach.starts import training_starts
 from lic_drake.seeds import STREAMS
 
 REQUEST_FILE = "_collection.yaml"
@@ -80,7 +82,9 @@ class CollectionRequest:
         return _thin(self.scenario.goals(self.stream, index), self.max_goals)
 
     def starts(self, environment: int | None = None) -> InitialConditions:
-        """Returns the m initial conditions in an environment; m is the same in all.
+        """Returns the m initial conditions in an environment.
+
+        m is the same in all but where base and torso of a robot are not.
 
         Args:
             environment: Its index in the stream; the first one by default.
@@ -90,21 +94,27 @@ class CollectionRequest:
         """
         index = self.first_environment if environment is None else environment
         starts = training_starts(self.scenario, self.stream, index)
-        if len(starts.x0) == 0:
+        if len(starts) == 0:
             raise RequestError(
                 f"{self.scenario.robot} can take no pose of the start line's grid;"
                 " change task.start_line in the scenario"
             )
-        return starts.take(_thin(np.arange(len(starts.x0)), self.max_starts))
+        return starts.take(_thin(np.arange(len(starts)), self.max_starts))
 
     def reaches(self, environment: int) -> list[ReachRequest]:
         """Returns the reaches into one environment; the starts vary fastest."""
         starts = self.starts(environment)
         return [
-            make_request(self.scenario, self.stream, environment, p_WG, x0, p_WR)
+            make_request(self.scenario, self.stream, environment, p_WG, x0, p_WR, torso_m)
             for p_WG in self.goals(environment)
-            for x0, p_WR in zip(*starts, strict=True)
+            for x0, p_WR, torso_m in zip(starts.x0, starts.p_WR, starts.torso_m, strict=True)
         ]
+
+    def num_reaches(self, environments: Sequence[int]) -> int:
+        """Returns how many reaches there are into some of the environments."""
+        if self.scenario.task.stand is None:
+            return len(self.goals()) * len(self.starts()) * len(environments)
+        return sum(len(self.goals(i)) * len(self.starts(i)) for i in environments)
 
     def refuse_unless_continuing(self, stored: "CollectionRequest", path: Path) -> None:
         """Checks that a library that was begun with `stored` can go on with this request.

@@ -21,6 +21,10 @@ SHOWN = (
     "final_phi",
     "final_vx",
     "final_vy",
+    "start_z",
+    "start_qx",
+    "final_z",
+    "final_vz",
 )
 """Columns of a reach that a robot knows when it has failed: x0', x_inf' and the final velocity."""
 

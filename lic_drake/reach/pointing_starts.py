@@ -1,132 +1,239 @@
 """Where a robot in space may start: the tool in the centre of an aperture, pointing in (IV-B)."""
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lic_drake.clutter.instance import ClutterInstance
-from lic_drake.errors import RequestError, ScenarioError
+from lic_drake.errors import ScenarioError
+from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.reach.scenario import Scenario
-from lic_drake.robots.pr2 import Pr2Arm
+from lic_drake.reach.task import Stand
+from lic_drake.robots.pr2 import Pr2Arm, pr2_arm
 from lic_drake.robots.pr2_inverse import ROBOT_TO_CLUTTER, calc_preselection_cost, solve_pointing
-from lic_drake.robots.registry import get_robot
 from lic_drake.scene.collision import CollisionChecker
 from lic_drake.scene.scene import SceneConfig
 
 Vector = NDArray[np.float64]
 
+STEP_M = (0.1, 0.05)
+"""Distances of neighbouring places of the base and heights of the torso in the grid, metres."""
+
+TOLERANCE = 1e-6
+"""A base, torso or tool this near to where it may be, metres, counts as there."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class PointingStarts:
-    """One initial condition for each open aperture that the arm can point into.
+    """Initial conditions at the open apertures of an environment; satisfies `Starts`.
 
-    The redundant arm has one pre-selected configuration there: of those in which it touches
+    The redundant arm has one pre-selected configuration for each: of those in which it touches
     neither board nor body the one of least cost, Eq. (5).
 
     Attributes:
-        aperture: Indices into the environment's apertures, shape (n,).
-        x0: Tool poses (x, y, z, qw, qx, qy, qz) in W, shape (n, 7).
-        q: Joint angles, shape (n, 7), radians.
-        p_WR: Where the base stands, shape (2,), metres.
-        torso_m: Height of the torso, metres.
+        scenario: The scenario; its robot is the PR2.
+        instance: The environment.
+        stand: Where base and torso may be.
     """
 
-    aperture: NDArray[np.intp]
-    x0: Vector
-    q: Vector
-    p_WR: Vector
-    torso_m: float
+    scenario: Scenario
+    instance: ClutterInstance
+    stand: Stand
 
-    def draw(self, rng: np.random.Generator, failed: NDArray[np.intp] | None = None) -> int:
-        """Draws one of them, all equally likely: the paper's strategy RND.
+    @property
+    def p_WA(self) -> Vector:
+        """Centres of the open apertures, shape (k, 3), metres."""
+        assert self.instance.p_WA is not None
+        return self.instance.p_WA
+
+    @property
+    def all_apertures(self) -> Vector:
+        """Centres of all apertures, open or blocked, shape (n, 3), metres."""
+        p_WA = self._bare_board.p_WA
+        assert p_WA is not None
+        return p_WA
+
+    @property
+    def aperture_m(self) -> float:
+        """Distance of neighbouring apertures' centres, metres."""
+        apart = np.linalg.norm(self.all_apertures[1:] - self.all_apertures[0], axis=1)
+        return float(apart.min())
+
+    @cached_property
+    def _bare_board(self) -> ClutterInstance:
+        bare: ClutterInstance = self.scenario.clutter.bare_board()  # type: ignore[attr-defined]
+        return bare
+
+    @cached_property
+    def checker(self) -> CollisionChecker:
+        """The robot on its wheels before the board; see `mobile_positions`."""
+        return CollisionChecker(Pr2Arm(mobile=True), self.instance, self.scenario.scene)
+
+    @property
+    def grid(self) -> InitialConditions:
+        """All open apertures, from places of the base and heights of the torso in equal steps."""
+        return self._table[0]
+
+    @property
+    def grid_angles(self) -> Vector:
+        """The joint angles of the grid, shape (n, 7), radians."""
+        return self._table[1]
+
+    def angles(self, x0: Vector, p_WR: Vector, torso_m: float) -> Vector | None:
+        """Returns the joint angles of an initial condition, shape (7,), None if there are none.
 
         Args:
-            rng: Source of the draw.
-            failed: Indices of those that have been tried.
-
-        Returns:
-            Its index, 0 to n - 1.
-
-        Raises:
-            RequestError: None is left.
+            x0: Tool pose in W, shape (7,).
+            p_WR: Base, shape (2,), metres.
+            torso_m: Height of the torso, metres.
         """
-        left = np.setdiff1d(np.arange(len(self.x0)), [] if failed is None else failed)
-        if len(left) == 0:
-            raise RequestError("the arm can point into no aperture that has not been tried")
-        return int(left[rng.integers(len(left))])
+        stand = self.stand
+        if not (
+            stand.y_min_m - TOLERANCE <= p_WR[1] <= stand.y_max_m + TOLERANCE
+            and stand.torso_min_m - TOLERANCE <= torso_m <= stand.torso_max_m + TOLERANCE
+            and abs(p_WR[0]) <= TOLERANCE
+            and np.min(np.linalg.norm(self.p_WA - x0[:3], axis=1)) <= TOLERANCE
+        ):
+            return None
+        x0_R = x0.copy()
+        x0_R[:2] -= p_WR
+        q = self.scenario.arm(torso_m).start_angles(x0_R)
+        return _first_free(self.checker, q, p_WR, torso_m)
+
+    @cached_property
+    def _table(self) -> tuple[InitialConditions, Vector]:
+        bare, stand = self._bare_board, self.stand
+        conditions, q = _preselect(
+            _rows(np.hstack([bare.p_WO, bare.size])),
+            _rows(self.all_apertures),
+            _steps(stand.y_min_m, stand.y_max_m, STEP_M[0]),
+            _steps(stand.torso_min_m, stand.torso_max_m, STEP_M[1]),
+        )
+        if len(self.p_WA) == len(self.all_apertures):
+            return conditions, q
+        apart = np.linalg.norm(conditions.x0[:, None, :3] - self.p_WA, axis=2).min(axis=1)
+        free = np.array(
+            [
+                near <= TOLERANCE and not self.checker.touches(mobile_positions(b0, row[None])[0])
+                for near, b0, row in zip(apart, conditions.b0, q, strict=True)
+            ]
+        )
+        return conditions.take(free), q[free]
 
 
-def find_pointing_starts(
-    scenario: Scenario,
-    instance: ClutterInstance,
-    p_WR: Vector | None = None,
-    torso_m: float | None = None,
+def pointing_starts(
+    scenario: Scenario, instance: ClutterInstance, stand: Stand | None = None
 ) -> PointingStarts:
     """Returns the initial conditions at the open apertures of an environment.
 
     Args:
         scenario: The scenario.
         instance: The environment.
-        p_WR: Where the base stands, shape (2,), metres; by default at the origin.
-        torso_m: Height of the torso, metres; by default as the scenario's task has it.
+        stand: Where base and torso may be; by default they do not move.
 
     Raises:
         ScenarioError: The robot cannot point, or the environment has no apertures.
     """
-    torso_m = scenario.task.torso_m if torso_m is None else torso_m
-    if not isinstance(scenario.arm(torso_m), Pr2Arm) or instance.p_WA is None:
+    if (
+        not isinstance(scenario.arm(), Pr2Arm)
+        or instance.p_WA is None
+        or not hasattr(scenario.clutter, "bare_board")
+    ):
         raise ScenarioError(
-            "starts that point into apertures need the robot pr2 and apertures;"
+            "starts that point into apertures need the robot pr2 and a board of apertures;"
             f" {scenario.category} with {scenario.robot} has other starts"
         )
-    base = np.zeros(2) if p_WR is None else p_WR
-    boxes = ~instance.movable
-    angles = _find_angles(
-        scenario.robot,
-        torso_m,
-        _rows(instance.p_WA - [*base, 0.0]),
-        _rows(np.hstack([instance.p_WO[boxes] - [*base, 0.0], instance.size[boxes]])),
-    )
-    arm = scenario.arm(torso_m)
-    found = [(i, np.array(q)) for i, q in enumerate(angles) if q is not None]
-    x0 = np.array([arm.tip_pose(q) for _, q in found]).reshape(-1, 7)
-    x0[:, :2] += base
     return PointingStarts(
-        aperture=np.array([i for i, _ in found], dtype=np.intp),
-        x0=x0 + 0.0,  # No negative zeros: they would make another key of the same start.
-        q=np.array([q for _, q in found]).reshape(-1, 7),
-        p_WR=base,
-        torso_m=torso_m,
+        scenario=scenario,
+        instance=instance,
+        stand=stand or standing_at(0.0, scenario.task.torso_m),
     )
+
+
+def standing_at(y_m: float, torso_m: float) -> Stand:
+    """Returns one place of the base and one height of the torso, metres."""
+    return Stand(
+        y_min_m=y_m,
+        y_max_m=y_m,
+        torso_min_m=torso_m,
+        torso_max_m=torso_m,
+        training_y_m=[y_m],
+        training_torso_m=[torso_m],
+    )
+
+
+def mobile_positions(b0: Vector, q: Vector) -> Vector:
+    """Returns the positions of all joints of the mobile robot, shape (n, 11).
+
+    Args:
+        b0: Place of the base and height of the torso, shape (3,), metres.
+        q: Joint angles, shape (n, 7), radians.
+    """
+    x, y, torso_m = b0
+    carried: Vector = np.hstack([np.tile([x, y, 0.0, torso_m], (len(q), 1)), q])
+    return carried
 
 
 @lru_cache(maxsize=64)
-def _find_angles(
-    robot: str,
-    torso_m: float,
-    p_RA: tuple[tuple[float, ...], ...],
+def _preselect(
     boxes: tuple[tuple[float, ...], ...],
-) -> tuple[tuple[float, ...] | None, ...]:
-    """Returns joint angles for each aperture, or None; all environments have the same board.
+    p_WA: tuple[tuple[float, ...], ...],
+    places: tuple[float, ...],
+    heights: tuple[float, ...],
+) -> tuple[InitialConditions, Vector]:
+    """Returns the initial conditions of a board, n, and their joint angles, shape (n, 7).
+
+    All environments have the same board, but for what is blocked.
 
     Args:
-        robot: Its name.
-        torso_m: Height of its torso, metres.
-        p_RA: Centres of the apertures in the robot's frame, metres.
-        boxes: Position and edges of each box of the board, metres.
+        boxes: Position and edges of each of its bars, metres.
+        p_WA: Centres of the apertures, metres.
+        places: Places of the base, y, metres.
+        heights: Heights of the torso, metres.
     """
-    arm = get_robot(robot).raised(torso_m)
-    assert isinstance(arm, Pr2Arm)
-    checker = CollisionChecker(arm, _board(np.array(boxes).reshape(-1, 6)), SceneConfig())
-    angles: list[tuple[float, ...] | None] = []
-    for p_RE in np.array(p_RA).reshape(-1, 3):
-        q = solve_pointing(arm.kinematics, p_RE, ROBOT_TO_CLUTTER)
-        q = q[np.argsort(calc_preselection_cost(arm.kinematics, q), kind="stable")]
-        free = next((row for row in q if not checker.touches(row)), None)
-        angles.append(None if free is None else tuple(free.tolist()))
-    return tuple(angles)
+    checker = CollisionChecker(
+        Pr2Arm(mobile=True), _board(np.array(boxes).reshape(-1, 6)), SceneConfig()
+    )
+    x0, p_WR, torso, angles = [], [], [], []
+    for y_m in places:
+        for torso_m in heights:
+            arm = pr2_arm().raised(torso_m)
+            base = np.array([0.0, y_m])
+            for p_WE in np.array(p_WA):
+                q = solve_pointing(arm.kinematics, p_WE - [*base, 0.0], ROBOT_TO_CLUTTER)
+                q = q[np.argsort(calc_preselection_cost(arm.kinematics, q), kind="stable")]
+                free = _first_free(checker, q, base, torso_m)
+                if free is not None:
+                    pose = arm.tip_pose(free)
+                    # Exactly the centre, and no negative zeros: they would make another key of
+                    # the same start.
+                    pose[:3] = p_WE
+                    x0.append(pose + 0.0)
+                    p_WR.append(base)
+                    torso.append(torso_m)
+                    angles.append(free)
+    conditions = InitialConditions(
+        np.array(x0).reshape(-1, 7), np.array(p_WR).reshape(-1, 2), np.array(torso)
+    )
+    return conditions, np.array(angles).reshape(-1, 7)
+
+
+def _first_free(
+    checker: CollisionChecker, q: Vector, p_WR: Vector, torso_m: float
+) -> Vector | None:
+    """Returns the first configuration, shape (7,), in which the arm touches nothing, if any."""
+    carried = mobile_positions(np.append(p_WR, torso_m), q)
+    return next(
+        (row for row, all_of in zip(q, carried, strict=True) if not checker.touches(all_of)), None
+    )
+
+
+def _steps(low: float, high: float, step: float) -> tuple[float, ...]:
+    """Returns numbers from low to high, both included, apart by at most a step."""
+    count = int(np.ceil((high - low) / step - 1e-9)) + 1
+    return tuple(np.round(np.linspace(low, high, count), 6).tolist())
 
 
 def _board(boxes: Vector) -> ClutterInstance:

@@ -45,55 +45,29 @@ def frame_rate(control_rate_hz: float) -> float:
     return rate
 
 
-class ReachRecording:
-    """A Meshcat scene of one environment in which reaches are recorded one after another.
+class MeshcatRecording:
+    """A Meshcat scene that is recorded frame by frame and saved as one file.
 
-    A reach is simulated first, as anywhere else but with its states kept, and its samples are
-    drawn afterwards. Must be used from the thread that made it.
+    Must be used from the thread that made it.
 
     Args:
-        scenario: Robot, task and control rate.
-        instance: The environment.
-        torso_m: Height of the robot's torso, metres; by default as the scenario's task has it.
+        scenario: Gives the control rate and the goal's size.
+        num_axes: 2 for clutter on the ground, 3 in space.
     """
 
-    def __init__(
-        self, scenario: Scenario, instance: ClutterInstance, torso_m: float | None = None
-    ) -> None:
+    def __init__(self, scenario: Scenario, num_axes: int) -> None:
         self._scenario = scenario
         self._meshcat = _make_meshcat()
         self._frames_per_second = frame_rate(scenario.mpc.rate_hz)
-        diagram = make_reach_diagram(
-            scenario, instance, self._meshcat, base_slides=True, torso_m=torso_m
-        )
-        self._drawing = Simulation(diagram, scenario.scene)
-        if instance.num_axes == 2:
-            self._draw_start_line()
         self._meshcat.SetProperty("/Background", "top_color", [0.97, 0.97, 0.98])
         self._meshcat.SetProperty("/Background", "bottom_color", [0.97, 0.97, 0.98])
         self._meshcat.SetProperty("/Grid", "visible", False)
         self._meshcat.SetProperty("/Axes", "visible", False)
-        self._meshcat.SetCameraPose(*_CAMERA[instance.num_axes])
+        self._meshcat.SetCameraPose(*_CAMERA[num_axes])
         self._meshcat.StartRecording(
             TICKS_PER_FRAME * self._frames_per_second, set_visualizations_while_recording=False
         )
         self._clock_s = 0.0
-
-    def add_reach(self, trace: ReachTrace, p_WG: Vector) -> None:
-        """Records a reach.
-
-        Args:
-            trace: Its samples with their states.
-            p_WG: Its goal, shape (3,), metres.
-        """
-        self._draw_goal(p_WG)
-        self._drawing.set_base(trace.p_WR)
-        every = round(self._scenario.mpc.rate_hz / self._frames_per_second)
-        for k in range(0, len(trace.states), every):
-            self._drawing.set_state(trace.states[k])
-            self._drawing.publish(self._clock_s + trace.time_s[k])
-        if trace.time_s:
-            self._clock_s += math.ceil(trace.time_s[-1] + PAUSE_S)
 
     def save(self, path: Path) -> None:
         """Writes the recording.
@@ -108,6 +82,56 @@ class ReachRecording:
         except OSError as error:
             raise LicError(f"cannot write {path}: {error.strerror}") from None
 
+    def _sample_steps(self) -> int:
+        """Returns how many samples of a reach there are for each frame."""
+        return round(self._scenario.mpc.rate_hz / self._frames_per_second)
+
+    def _draw_goal(self, p_WG: Vector) -> None:
+        radius = self._scenario.stop.success_distance_m
+        self._meshcat.SetObject("/task/goal", Sphere(radius), Rgba(0.0, 0.7, 0.8, 0.9))
+        self._meshcat.SetTransform("/task/goal", RigidTransform(p_WG))
+        self._meshcat.SetObject("/task/pole", Cylinder(0.002, 0.3), Rgba(0.0, 0.7, 0.8, 0.9))
+        self._meshcat.SetTransform("/task/pole", RigidTransform(p_WG))
+
+
+class ReachRecording(MeshcatRecording):
+    """A Meshcat scene of one environment in which reaches are recorded one after another.
+
+    A reach is simulated first, as anywhere else but with its states kept, and its samples are
+    drawn afterwards.
+
+    Args:
+        scenario: Robot, task and control rate.
+        instance: The environment.
+        torso_m: Height of the robot's torso, metres; by default as the scenario's task has it.
+    """
+
+    def __init__(
+        self, scenario: Scenario, instance: ClutterInstance, torso_m: float | None = None
+    ) -> None:
+        super().__init__(scenario, instance.num_axes)
+        diagram = make_reach_diagram(
+            scenario, instance, self._meshcat, base_slides=True, torso_m=torso_m
+        )
+        self._drawing = Simulation(diagram, scenario.scene)
+        if instance.num_axes == 2:
+            self._draw_start_line()
+
+    def add_reach(self, trace: ReachTrace, p_WG: Vector) -> None:
+        """Records a reach.
+
+        Args:
+            trace: Its samples with their states.
+            p_WG: Its goal, shape (3,), metres.
+        """
+        self._draw_goal(p_WG)
+        self._drawing.set_base(trace.p_WR)
+        for k in range(0, len(trace.states), self._sample_steps()):
+            self._drawing.set_state(trace.states[k])
+            self._drawing.publish(self._clock_s + trace.time_s[k])
+        if trace.time_s:
+            self._clock_s += math.ceil(trace.time_s[-1] + PAUSE_S)
+
     def _draw_start_line(self) -> None:
         """Draws where the hand may start, green, or, with a mobile base, where that may, blue."""
         line, track = self._scenario.task.start_line, self._scenario.task.base
@@ -117,13 +141,6 @@ class ReachRecording:
         else:
             ends = np.array([[0.0, track.y_min_m, -0.1], [0.0, track.y_max_m, -0.1]])
             self._meshcat.SetLine("/task/base_track", ends.T, 3.0, Rgba(0.1, 0.3, 0.8, 1.0))
-
-    def _draw_goal(self, p_WG: Vector) -> None:
-        radius = self._scenario.stop.success_distance_m
-        self._meshcat.SetObject("/task/goal", Sphere(radius), Rgba(0.0, 0.7, 0.8, 0.9))
-        self._meshcat.SetTransform("/task/goal", RigidTransform(p_WG))
-        self._meshcat.SetObject("/task/pole", Cylinder(0.002, 0.3), Rgba(0.0, 0.7, 0.8, 0.9))
-        self._meshcat.SetTransform("/task/pole", RigidTransform(p_WG))
 
 
 def _make_meshcat() -> Meshcat:

@@ -3,15 +3,15 @@
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property, lru_cache
-from typing import NamedTuple, Protocol, Self
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import RequestError
 from lic_drake.reach.hand_poses import HandPoses, Vector
-from lic_drake.reach.pointing_starts import find_pointing_starts
+from lic_drake.reach.initial_conditions import InitialConditions
+from lic_drake.reach.pointing_starts import pointing_starts, standing_at
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.task import BaseTrack, StartLine
 from lic_drake.robots.pr2 import Pr2Arm
@@ -20,32 +20,6 @@ from lic_drake.seeds import make_generator
 
 TOLERANCE = 1e-6
 """A base or a hand this near to its bounds, in metres, counts as inside."""
-
-
-class InitialConditions(NamedTuple):
-    """n initial conditions.
-
-    Attributes:
-        x0: Hand poses (x, y, phi) in W, shape (n, 3), metres and radians; in space position and
-            quaternion, shape (n, 7).
-        p_WR: Positions of the base in the plane, shape (n, 2), metres.
-    """
-
-    x0: Vector
-    p_WR: Vector
-
-    @property
-    def in_R(self) -> Vector:
-        """The hand poses in the robot's frame, shape (n, 3)."""
-        return self.x0 - np.column_stack([self.p_WR, np.zeros(len(self.p_WR))])
-
-    def take(self, which: NDArray[np.generic]) -> Self:
-        """Returns some of them, by a mask or by indices."""
-        return type(self)(self.x0[which], self.p_WR[which])
-
-    def join(self, other: "InitialConditions") -> Self:
-        """Returns these followed by others."""
-        return type(self)(np.vstack([self.x0, other.x0]), np.vstack([self.p_WR, other.p_WR]))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,7 +49,26 @@ class Region:
 
 
 class Starts(Protocol):
-    """The initial conditions that a robot can choose from in an environment.
+    """The initial conditions that a robot can choose from in an environment."""
+
+    @property
+    def grid(self) -> InitialConditions:
+        """The discrete ones, from which RND and COST choose."""
+        ...
+
+    def angles(self, x0: Vector, p_WR: Vector, torso_m: float) -> Vector | None:
+        """Returns joint angles with which the robot can start so, shape (m,), else None.
+
+        Args:
+            x0: Hand pose in W, shape (3,), or (7,) in space.
+            p_WR: Base, shape (2,), metres.
+            torso_m: Height of the torso, metres; 0 for a robot without one.
+        """
+        ...
+
+
+class PlanarStarts(Starts, Protocol):
+    """Those of a planar arm.
 
     Attributes:
         poses: The hand poses that the arm can take, in R.
@@ -92,13 +85,8 @@ class Starts(Protocol):
         ...
 
     @property
-    def grid(self) -> InitialConditions:
-        """The discrete ones, from which RND and COST choose."""
-        ...
-
-    @property
     def lattice(self) -> InitialConditions:
-        """A denser set."""
+        """A denser set than the grid."""
         ...
 
 
@@ -107,8 +95,8 @@ def find_region(regions: Sequence[Region], x0: Vector, p_WR: Vector) -> Region |
     return next((region for region in regions if region.holds(x0, p_WR, 1e-5)), None)
 
 
-def is_possible(starts: Starts, x0: Vector, p_WR: Vector) -> bool:
-    """Tells whether the robot can start so; uses the closed-form inverse kinematics.
+def is_possible(starts: PlanarStarts, x0: Vector, p_WR: Vector) -> bool:
+    """Tells whether a planar arm can start so; uses the closed-form inverse kinematics.
 
     Args:
         starts: The possible initial conditions.
@@ -119,9 +107,16 @@ def is_possible(starts: Starts, x0: Vector, p_WR: Vector) -> bool:
     return inside and starts.poses.contains(x0 - [*p_WR, 0.0])
 
 
+def _planar_angles(starts: PlanarStarts, x0: Vector, p_WR: Vector) -> Vector | None:
+    """Returns the joint angles of a planar arm that starts so, None if it cannot."""
+    if not is_possible(starts, x0, p_WR):
+        return None
+    return starts.poses.arm.solve_ik(x0 - [*p_WR, 0.0])
+
+
 @dataclass(frozen=True, kw_only=True)
 class LineStarts:
-    """A fixed base: the hand starts anywhere on the start line; satisfies `Starts`."""
+    """A fixed base: the hand starts anywhere on the start line; satisfies `PlanarStarts`."""
 
     poses: HandPoses
 
@@ -141,10 +136,14 @@ class LineStarts:
         """Poses 0.025 m and 7.5 degrees apart."""
         return InitialConditions(self.poses.lattice, np.zeros((len(self.poses.lattice), 2)))
 
+    def angles(self, x0: Vector, p_WR: Vector, torso_m: float = 0.0) -> Vector | None:
+        """Returns joint angles with which the arm can start so, else None; see `Starts`."""
+        return _planar_angles(self, x0, p_WR)
+
 
 @dataclass(frozen=True, kw_only=True)
 class ApertureStarts:
-    """A mobile base: the hand starts in the centre of an aperture; satisfies `Starts`.
+    """A mobile base: the hand starts in the centre of an aperture; satisfies `PlanarStarts`.
 
     Attributes:
         poses: Hand poses relative to the base.
@@ -179,6 +178,10 @@ class ApertureStarts:
     def lattice(self) -> InitialConditions:
         """As `grid`, 0.025 m and 7.5 degrees apart or denser."""
         return self._at_apertures(self.poses.lattice)
+
+    def angles(self, x0: Vector, p_WR: Vector, torso_m: float = 0.0) -> Vector | None:
+        """Returns joint angles with which the arm can start so, else None; see `Starts`."""
+        return _planar_angles(self, x0, p_WR)
 
     def draw(self, rng: np.random.Generator, per_aperture: int) -> InitialConditions:
         """Draws uniformly among the possible ones, the same number at each aperture.
@@ -215,8 +218,22 @@ class ApertureStarts:
         return found
 
 
-def make_starts(scenario: Scenario, instance: ClutterInstance) -> LineStarts | ApertureStarts:
-    """Returns the initial conditions that are possible in an environment of a scenario."""
+def make_starts(scenario: Scenario, instance: ClutterInstance, moves: bool = True) -> Starts:
+    """Returns the initial conditions that are possible in an environment of a scenario.
+
+    Args:
+        scenario: The scenario.
+        instance: The environment.
+        moves: Whether a PR2 may move its base and torso as the task allows; without, they stay
+            where they are.
+    """
+    if isinstance(scenario.arm(), Pr2Arm):
+        return pointing_starts(scenario, instance, scenario.task.stand if moves else None)
+    return planar_starts(scenario, instance)
+
+
+def planar_starts(scenario: Scenario, instance: ClutterInstance) -> LineStarts | ApertureStarts:
+    """Returns the initial conditions of a planar arm in an environment of a scenario."""
     poses, track = _poses(scenario), scenario.task.base
     if track is None or instance.p_WA is None:
         return LineStarts(poses=poses)
@@ -231,11 +248,13 @@ def training_starts(scenario: Scenario, stream: str, environment: int) -> Initia
     than the paper's 15 reaches an environment.
     """
     if isinstance(scenario.arm(), Pr2Arm):
-        pointing = find_pointing_starts(scenario, scenario.sample_instance(stream, environment))
-        return InitialConditions(pointing.x0, np.tile(pointing.p_WR, (len(pointing.x0), 1)))
+        stand = scenario.task.stand
+        place = (0.0, scenario.task.torso_m) if stand is None else stand.for_training(environment)
+        instance = scenario.sample_instance(stream, environment)
+        return pointing_starts(scenario, instance, standing_at(*place)).grid
     if scenario.task.base is None:
         return LineStarts(poses=_poses(scenario)).grid
-    starts = make_starts(scenario, scenario.sample_instance(stream, environment))
+    starts = planar_starts(scenario, scenario.sample_instance(stream, environment))
     if isinstance(starts, LineStarts):
         return starts.grid
     return starts.draw(

@@ -2,7 +2,7 @@
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,10 @@ class StopConfig:
     # A reach is stuck when the tip moved less than `stuck_distance_m` in `stuck_time_s`.
     stuck_distance_m: float = 0.005
     stuck_time_s: float = 3.0
+    # Where objects give way slowly: a reach is also stuck when its smallest distance to the goal
+    # fell by less than `progress_m` in `progress_time_s`; 0: this does not count.
+    progress_m: float = field(default=0.0, metadata={"since": 3})
+    progress_time_s: float = field(default=3.0, metadata={"since": 3})
     # Simulated seconds after which a reach fails.
     timeout_s: float = 30.0
     # A reach fails when a taxel reads more than `force_limit_N` for `force_time_s` on end. The
@@ -32,7 +36,9 @@ class StopConfig:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            if not value > 0.0:
+            if name == "progress_m" and not 0.0 <= value < math.inf:
+                raise ScenarioError(f"stop rule progress_m must be 0 or more, got {value}")
+            if name != "progress_m" and not value > 0.0:
                 raise ScenarioError(f"stop rule {name} must be positive, got {value}")
         if self.timeout_s > MAX_TIMEOUT_S:
             raise ScenarioError(
@@ -46,11 +52,12 @@ class StopMonitor:
     def __init__(self, config: StopConfig, p_WG: NDArray[np.float64], period_s: float) -> None:
         self._config = config
         self._p_WG = p_WG
-        # Tip positions from now back to `stuck_time_s` ago, at the control period.
-        # A window longer than the time-out never fills, however long it is.
-        window_s = min(config.stuck_time_s, config.timeout_s + period_s)
+        # Tip positions and smallest distances from now back to so long ago, at the control period.
         self._recent: deque[NDArray[np.float64]] = deque(
-            maxlen=max(1, round(window_s / period_s)) + 1
+            maxlen=_samples(config, period_s, config.stuck_time_s)
+        )
+        self._nearest: deque[float] = deque(
+            maxlen=_samples(config, period_s, config.progress_time_s)
         )
         self._low_force_time_s = 0.0
         self.min_distance = np.inf
@@ -76,6 +83,16 @@ class StopMonitor:
             moved = math.dist(self._recent[-1], self._recent[0])
             if moved < self._config.stuck_distance_m:
                 return "stuck"
+        self._nearest.append(self.min_distance)
+        if len(self._nearest) == self._nearest.maxlen:
+            progress = self._nearest[0] - self.min_distance
+            if progress < self._config.progress_m:
+                return "stuck"
         if time_s >= self._config.timeout_s - 1e-9:
             return "timeout"
         return None
+
+
+def _samples(config: StopConfig, period_s: float, window_s: float) -> int:
+    """Returns how many samples a window holds; one longer than the time-out never fills."""
+    return max(1, round(min(window_s, config.timeout_s + period_s) / period_s)) + 1

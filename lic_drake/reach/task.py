@@ -120,6 +120,43 @@ class BaseTrack:
 
 
 @dataclass(kw_only=True)
+class Stand:
+    """Where the base and the torso of a robot in space may be when it reaches.
+
+    They translate parallel to the environment's surface (paper IV-B): the base along Wy through
+    the origin, the torso along Wz.
+    """
+
+    # Ends of the segment for the base's origin, metres.
+    y_min_m: float = 0.0
+    y_max_m: float = 0.0
+    # Lowest and highest torso, metres.
+    torso_min_m: float = 0.15
+    torso_max_m: float = 0.15
+    # A collection's environments have each of these with each of those, in turn.
+    training_y_m: list[float] = field(default_factory=lambda: [0.0])
+    training_torso_m: list[float] = field(default_factory=lambda: [0.15])
+
+    def __post_init__(self) -> None:
+        _check_range("stand y_m", self.y_min_m, self.y_max_m, 0.1)
+        _check_range("stand torso_m", self.torso_min_m, self.torso_max_m, 0.1)
+        for name, values, low, high in (
+            ("training_y_m", self.training_y_m, self.y_min_m, self.y_max_m),
+            ("training_torso_m", self.training_torso_m, self.torso_min_m, self.torso_max_m),
+        ):
+            if not values or not all(low <= value <= high for value in values):
+                raise ScenarioError(
+                    f"stand {name} must be numbers from {low} to {high}, one at least, got {values}"
+                )
+
+    def for_training(self, environment: int) -> tuple[float, float]:
+        """Returns the base's y and the torso's height in an environment of a library, metres."""
+        columns = len(self.training_y_m)
+        y_m = self.training_y_m[environment % columns]
+        return y_m, self.training_torso_m[environment // columns % len(self.training_torso_m)]
+
+
+@dataclass(kw_only=True)
 class Task:
     """The start line and the goals of a scenario."""
 
@@ -128,6 +165,8 @@ class Task:
     base: BaseTrack | None = field(default=None, metadata={"since": 2})
     # Height of the robot's torso lift, metres; 0 for a robot without one.
     torso_m: float = field(default=0.0, metadata={"since": 3})
+    # None: base and torso stay where they are.
+    stand: Stand | None = field(default=None, metadata={"since": 3})
     # None: the goal is the one that each environment offers (passage-clutter).
     goal_area: GoalArea | None = field(default_factory=GoalArea)
 

@@ -44,6 +44,7 @@ class Arm(Protocol):
         stiffness: Joint stiffness of the impedance controller, shape (m,), Nm/rad.
         p_RS: The point about which the whole arm turns, shape (3,), metres.
         reach_m: Largest distance of the tip from it, metres.
+        torso_m: Height of the torso that carries it, metres; 0 without one.
         skin: The surface of the arm, as capsules or by capsules around it.
     """
 
@@ -54,6 +55,7 @@ class Arm(Protocol):
     stiffness: Vector
     p_RS: Vector
     reach_m: float
+    torso_m: float
     skin: tuple[SkinCapsule, ...]
 
     @property

@@ -60,6 +60,7 @@ class PlanarArm:
         self.q_min = self.kinematics.q_min
         self.q_max = self.kinematics.q_max
         self.p_RS = np.zeros(3)
+        self.torso_m = 0.0
         self.reach_m = self.kinematics.reach_m
         gains = [
             plant.get_joint_actuator(index).get_controller_gains()

@@ -56,6 +56,8 @@ class Pr2Arm:
     Args:
         base_pose: Where the base stands in R: x, y (metres) and heading (radians).
         torso_m: Height of the torso lift, metres.
+        mobile: Whether base and torso keep their joints in a plant, for a robot that moves between
+            reaches or looks for a place to reach from; nothing drives them.
 
     Raises:
         ScenarioError: The torso cannot go there.
@@ -65,7 +67,10 @@ class Pr2Arm:
     link_names: tuple[str, ...] = link_names()
 
     def __init__(
-        self, base_pose: Sequence[float] = (0.0, 0.0, 0.0), torso_m: float = TORSO_RANGE_M[0]
+        self,
+        base_pose: Sequence[float] = (0.0, 0.0, 0.0),
+        torso_m: float = TORSO_RANGE_M[0],
+        mobile: bool = False,
     ) -> None:
         if not TORSO_RANGE_M[0] <= torso_m <= TORSO_RANGE_M[1]:
             raise ScenarioError(
@@ -74,6 +79,7 @@ class Pr2Arm:
         x, y, theta = (float(value) for value in base_pose)
         self.base_pose = (x, y, theta)
         self.torso_m = torso_m
+        self.mobile = mobile
         pr2 = read_pr2()
         mpc_min, mpc_max = np.deg2rad(MPC_LIMITS_DEG).T
         self.q_min: Vector = np.maximum(mpc_min, pr2.q_min)
@@ -96,22 +102,20 @@ class Pr2Arm:
         self._pose = lru_cache(maxsize=1)(self.kinematics.calc_pose)
 
     def add_to_plant(
-        self, plant: MultibodyPlant, parent: Frame | None = None, mobile: bool = False
+        self, plant: MultibodyPlant, parent: Frame | None = None
     ) -> ModelInstanceIndex:
         """Adds the robot without gravity, its floor frame R welded to a frame, else to the world.
 
         Args:
             plant: The plant, not yet finalized.
             parent: The frame that becomes R.
-            mobile: Whether base and torso keep their joints, for drawings of a robot that moves
-                between reaches; nothing drives them.
         """
         pr2 = add_pr2(plant)
         root = plant.GetFrameByName("base_link_for_rbt_compat", pr2)
         plant.WeldFrames(parent or plant.world_frame(), root)
         stand = dict(zip((*BASE_JOINTS, TORSO_JOINT), (*self.base_pose, self.torso_m), strict=True))
         rest = dict(zip(joint_names("l"), LEFT_ARM_AT_REST, strict=True))
-        if mobile:
+        if self.mobile:
             for name, position in stand.items():
                 plant.GetJointByName(name, pr2).set_default_positions(np.array([position]))
             weld_joints(plant, pr2, rest)

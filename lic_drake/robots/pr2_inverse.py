@@ -117,13 +117,22 @@ def calc_preselection_cost(
         alpha: Weight of the wrist, positive (the paper does not give it).
         beta: Weight of the elbow, positive (the paper does not give it).
     """
-    if not len(q):
-        return np.zeros(0)
-    poses = [kinematics.calc_pose(*row.tolist()) for row in q]
-    p_RE = np.array([pose.p_RE for pose in poses])
-    depth = np.array([pose.p_RL[[5, 3]] for pose in poses]) - p_RE[:, None]
-    wrist, elbow = np.abs(depth @ x_R).T
-    cost: Vector = 1.0 / (alpha * wrist + beta * elbow)
+    pan, lift, upper_arm_roll, elbow, forearm_roll, wrist, _ = q.T[..., None]
+    heading = kinematics.yaw + pan
+    zero = np.zeros_like(pan)
+    x, y = (
+        np.hstack([np.cos(heading), np.sin(heading), zero]),
+        np.hstack([-np.sin(heading), np.cos(heading), zero]),
+    )
+    z: Vector = np.broadcast_to([0.0, 0.0, 1.0], x.shape)
+    z, upper_arm = _turn(z, x, lift)
+    y, z = _turn(y, z, upper_arm_roll)
+    z, forearm = _turn(z, upper_arm, elbow)
+    y, z = _turn(y, z, forearm_roll)
+    _, tool = _turn(z, forearm, wrist)
+    wrist_to_tool = kinematics.lengths.tool * (tool @ x_R)
+    elbow_to_tool = wrist_to_tool + kinematics.lengths.forearm * (forearm @ x_R)
+    cost: Vector = 1.0 / (alpha * np.abs(wrist_to_tool) + beta * np.abs(elbow_to_tool))
     return cost
 
 
@@ -149,9 +158,9 @@ def _complete(
     up = aside * np.cos(roll)
     lift = np.arctan2(up * x - along * z, along * x + up * z)
     ux, uy, uz = heading.u_S.T
-    uz, ux = _turn_back(uz, ux, lift)
-    uy, uz = _turn_back(uy, uz, roll)
-    uz, ux = _turn_back(uz, ux, elbow)
+    uz, ux = _turn(uz, ux, lift)
+    uy, uz = _turn(uy, uz, roll)
+    uz, ux = _turn(uz, ux, elbow)
     bend = np.hypot(uy, uz)
     wrist = -np.arctan2(bend, ux)
     forearm_roll = np.where(bend > _STRAIGHT, _wrap(np.arctan2(-uy, uz)), 0.0)
@@ -160,8 +169,11 @@ def _complete(
     )
 
 
-def _turn_back(u: Vector, v: Vector, angle: Vector) -> tuple[Vector, Vector]:
-    """Returns components along the axes of u and v after these have turned from u to v."""
+def _turn(u: Vector, v: Vector, angle: Vector) -> tuple[Vector, Vector]:
+    """Returns axes u and v after they have turned from u to v.
+
+    Components along two axes that turn the other way change alike.
+    """
     c, s = np.cos(angle), np.sin(angle)
     return c * u + s * v, c * v - s * u
 

@@ -5,7 +5,7 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import QueryObject
+from pydrake.geometry import CollisionFilterDeclaration, GeometrySet, QueryObject
 from pydrake.systems.framework import Context, DiagramBuilder
 
 from lic_drake.clutter.instance import ClutterInstance
@@ -37,19 +37,36 @@ class CollisionChecker:
         arm: The arm with the robot that carries it.
         instance: The environment in the robot's frame.
         config: Gives the contact properties.
+
+    Attributes:
+        plant: Robot and objects; its geometry knows only pairs with the arm.
+        plant_context: Its context, in which `touches` sets positions.
     """
 
     def __init__(self, arm: Arm, instance: ClutterInstance, config: SceneConfig) -> None:
         builder = DiagramBuilder()
         self._scene = add_scene(builder, arm, _fixed_part(instance), config)
+        self._forget_pairs_without_the_arm()
         self._diagram = builder.Build()
         self._root = self._diagram.CreateDefaultContext()
-        self._context = self._scene.plant.GetMyMutableContextFromRoot(self._root)
+        self.plant = self._scene.plant
+        self.plant_context = self.plant.GetMyMutableContextFromRoot(self._root)
 
     def touches(self, q: Vector) -> bool:
-        """Tells whether the arm touches anything at joint angles q, shape (m,), radians."""
-        self._scene.plant.SetPositions(self._context, self._scene.arm, q)
+        """Tells whether the arm touches anything at positions q of the robot's joints.
+
+        Args:
+            q: Joint angles, shape (m,), radians; for a mobile robot those of all its joints.
+        """
+        self.plant.SetPositions(self.plant_context, self._scene.arm, q)
         return is_touching(self._scene, self._root)
+
+    def _forget_pairs_without_the_arm(self) -> None:
+        """Board and the rest of the robot may be as near to each other as they like."""
+        others = GeometrySet([*self._scene.objects, *self._scene.body])
+        self._scene.scene_graph.collision_filter_manager().Apply(
+            CollisionFilterDeclaration().ExcludeWithin(others)
+        )
 
 
 def _fixed_part(instance: ClutterInstance) -> ClutterInstance:

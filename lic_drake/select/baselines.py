@@ -1,13 +1,14 @@
 """RND and COST, the strategies that the paper compares LIC with (VI-A)."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lic_drake.errors import RequestError
-from lic_drake.reach.starts import is_possible
+from lic_drake.reach.initial_conditions import InitialConditions
+from lic_drake.reach.request import IN_PLANE
 from lic_drake.select.situation import Selection, Situation
 
 Vector = NDArray[np.float64]
@@ -16,30 +17,46 @@ HAND_LENGTH_M = 0.288
 HAND_RADIUS_M = 0.015
 OBJECT_RADIUS_M = 0.01
 
+PR2_HAND_LENGTH_M = 0.18
+PR2_HAND_RADIUS_M = 0.06
+SPHERE_RADIUS_M = 0.05
+
 
 def corridor_cost(x0: Vector, p_WG: Vector) -> Vector:
-    """Returns the area that the last link sweeps on the straight way to the goal, shape (n,).
+    """Returns what the last link sweeps on the straight way to the goal, shape (n,).
 
     Divided by the clutter's density it is the expected number of contacts, the paper's
     "minimum-contact corridor": it grows with the distance to the goal and with the angle between
-    the hand and the way. The paper gives no formula; this one is ours:
+    the hand and the way. The paper gives no formula; these are ours, with r = r_hand + r_object:
 
-        C = d (2 (r_hand + r_object) + l s(delta)),  s = sin(delta) up to 90 degrees, else 1
+        in the plane  C = d (2 r + l s(delta)),  s = sin(delta) up to 90 degrees, else 1
+        in space      C = d (pi r^2 + 2 r l s(delta))
 
     Args:
-        x0: Start poses (x, y, phi), shape (n, 3), metres and radians.
+        x0: Start poses, (x, y, phi), shape (n, 3), or position and quaternion, shape (n, 7).
         p_WG: Goal, shape (3,), metres.
 
     Returns:
-        Cost, shape (n,), square metres.
+        Cost, shape (n,), square metres, in space cubic metres.
     """
-    way = p_WG[:2] - x0[:, :2]
+    in_plane = x0.shape[1] == IN_PLANE
+    position = slice(0, 2 if in_plane else 3)
+    way = p_WG[position] - x0[:, position]
     distance = np.linalg.norm(way, axis=1)
-    hand = np.column_stack([np.cos(x0[:, 2]), np.sin(x0[:, 2])])
+    if in_plane:
+        hand = np.column_stack([np.cos(x0[:, 2]), np.sin(x0[:, 2])])
+    else:
+        w, x, y, z = x0[:, 3:].T
+        hand = np.column_stack(
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)]
+        )
     cos_delta = np.sum(way * hand, axis=1) / np.maximum(distance, 1e-12)
     sin_delta = np.sqrt(np.maximum(0.0, 1.0 - cos_delta**2))
-    width = 2.0 * (HAND_RADIUS_M + OBJECT_RADIUS_M)
-    return distance * (width + HAND_LENGTH_M * np.where(cos_delta >= 0.0, sin_delta, 1.0))
+    aside = np.where(cos_delta >= 0.0, sin_delta, 1.0)
+    if in_plane:
+        return distance * (2.0 * (HAND_RADIUS_M + OBJECT_RADIUS_M) + HAND_LENGTH_M * aside)
+    r = PR2_HAND_RADIUS_M + SPHERE_RADIUS_M
+    return distance * (np.pi * r**2 + 2.0 * r * PR2_HAND_LENGTH_M * aside)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,39 +74,45 @@ class RandomSelector:
         """Draws a start."""
         began = time.perf_counter()
         choices = situation.starts.grid.take(situation.untried(situation.starts.grid))
-        if len(choices.x0) == 0:
+        if len(choices) == 0:
             raise RequestError("all discrete starts have failed; no start is left to draw")
-        i = self.rng.integers(len(choices.x0))
-        return make_selection(situation, choices.x0[i], choices.p_WR[i], None, self.method, began)
+        i = int(self.rng.integers(len(choices)))
+        return make_selection(situation, choices, i, None, self.method, began)
 
 
 @dataclass(frozen=True, kw_only=True)
 class CostSelector:
     """COST: the discrete start with the smallest corridor cost, away from failed ones.
 
-    A mobile base adds nothing to the corridor; of equal ones that is taken whose base is nearest
-    to the goal's y, where most of the arm's length is left for the way in.
+    A mobile base and a torso add nothing to the corridor; of equal ones that is taken whose
+    shoulder is nearest to the goal across x, where most of the arm's length is left for the way in.
+
+    Attributes:
+        p_RS: The shoulder about which the arm turns, in the robot's frame with the torso at 0,
+            shape (3,), metres.
     """
 
+    p_RS: Vector = field(default_factory=lambda: np.zeros(3))
     method: str = "cost"
 
     def select(self, situation: Situation) -> Selection:
         """Returns the best start."""
         began = time.perf_counter()
         choices = situation.starts.grid.take(situation.allowed(situation.starts.grid))
-        if len(choices.x0) == 0:
+        if len(choices) == 0:
             raise RequestError("no discrete start is left away from the failed ones")
         cost = corridor_cost(choices.x0, situation.p_WG)
-        aside = np.abs(choices.p_WR[:, 1] - situation.p_WG[1])
+        across = slice(1, 2 if choices.x0.shape[1] == IN_PLANE else 3)
+        aside = np.linalg.norm((choices.b0 + self.p_RS - situation.p_WG)[:, across], axis=1)
         # Rounded: equal poses have equal costs but for the last digits.
-        i = np.lexsort([aside, np.round(cost, 9)])[0]
-        return make_selection(situation, choices.x0[i], choices.p_WR[i], None, self.method, began)
+        i = int(np.lexsort([aside, np.round(cost, 9)])[0])
+        return make_selection(situation, choices, i, None, self.method, began)
 
 
 def make_selection(
     situation: Situation,
-    x0: Vector,
-    p_WR: Vector,
+    conditions: InitialConditions,
+    index: int,
     probability: float | None,
     method: str,
     began: float,
@@ -98,21 +121,22 @@ def make_selection(
 
     Args:
         situation: What was asked.
-        x0: The chosen pose, shape (3,).
-        p_WR: The chosen base, shape (2,), metres.
+        conditions: Initial conditions.
+        index: Which of them was chosen.
         probability: Its estimated probability of success, if there is an estimate.
         method: Name of the strategy.
         began: `time.perf_counter()` at the beginning of the selection.
 
     Raises:
-        RequestError: The arm cannot take the pose.
+        RequestError: The arm cannot start there.
     """
-    starts = situation.starts
-    q = starts.poses.arm.solve_ik(x0 - [*p_WR, 0.0])
-    if q is None or not is_possible(starts, x0, p_WR):
+    x0, p_WR = conditions.x0[index], conditions.p_WR[index]
+    torso_m = float(conditions.torso_m[index])
+    q = situation.starts.angles(x0, p_WR, torso_m)
+    if q is None:
         raise RequestError(
             f"the arm cannot start at {np.round(x0, 4).tolist()} from a base at"
-            f" {np.round(p_WR, 4).tolist()}"
+            f" {np.round(p_WR, 4).tolist()} with the torso at {torso_m:.4f} m"
         )
     return Selection(
         x0=x0,
@@ -121,4 +145,5 @@ def make_selection(
         probability=probability,
         method=method,
         seconds=time.perf_counter() - began,
+        torso_m=torso_m,
     )

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from lic_drake.estimate.estimator import SuccessEstimator
 from lic_drake.estimate.features import FeatureMap
-from lic_drake.reach.starts import InitialConditions
+from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.select.situation import FailedReach
 
 Vector = NDArray[np.float64]
@@ -41,32 +41,31 @@ class Objective:
     def values(self, conditions: InitialConditions) -> Vector:
         """Returns the unclipped estimates at n initial conditions, shape (n,)."""
         features = self.model.features
-        base = np.column_stack([conditions.p_WR, np.zeros(len(conditions.p_WR))])
-        p_RG, x0 = self.p_WG - base, conditions.in_R
+        p_RG, x0 = self.p_WG - conditions.b0, conditions.in_R
         if not self.failed:
             return self.model.estimator.values(features.join(p_RG, x0))
         estimates = []
         for failed in self.failed:
-            seen = np.array([features.observation(failed.shown, b) for b in conditions.p_WR])
+            seen = np.array([features.observation(failed.shown, b) for b in conditions.b0])
             estimates.append(self.model.estimator.values(features.join(p_RG, x0, seen)))
         least: Vector = np.min(estimates, axis=0)
         return least
 
-    def value_and_gradient(self, x0: Vector, p_WR: Vector) -> tuple[float, Vector, Vector]:
-        """Returns the estimate and its gradients by x0, shape (3,), and by the base, shape (2,).
+    def value_and_gradient(self, x0: Vector, b0: Vector) -> tuple[float, Vector, Vector]:
+        """Returns the estimate and its gradients by x0 and by b0, shape (3,).
 
         Args:
-            x0: Hand pose in W, shape (3,).
-            p_WR: Base, shape (2,), metres.
+            x0: Hand pose in W, shape (3,), or (7,) in space.
+            b0: Place of the base and height of the torso, shape (3,), metres.
         """
-        features, offset = self.model.features, np.append(p_WR, 0.0)
+        features = self.model.features
+        x0_R = x0.copy()
+        x0_R[:3] -= b0
         observed: list[Vector | None] = [None]
         if self.failed:
-            observed = [features.observation(failed.shown, p_WR) for failed in self.failed]
+            observed = [features.observation(failed.shown, b0) for failed in self.failed]
         candidates = [
-            self.model.estimator.value_and_gradient(
-                features.join(self.p_WG - offset, x0 - offset, seen)
-            )
+            self.model.estimator.value_and_gradient(features.join(self.p_WG - b0, x0_R, seen))
             for seen in observed
         ]
         value, by_z = min(candidates, key=lambda candidate: candidate[0])

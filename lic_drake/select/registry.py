@@ -12,10 +12,13 @@ from lic_drake.estimate.categories import features_of
 from lic_drake.estimate.features import FeatureMap
 from lic_drake.estimate.registry import estimator_names, make_estimator
 from lic_drake.experience.second_reach import pair_reaches
+from lic_drake.robots.arm import Arm
 from lic_drake.robots.planar import PlanarArm
+from lic_drake.robots.pr2 import Pr2Arm
 from lic_drake.select.baselines import CostSelector, RandomSelector
-from lic_drake.select.lic import LicSelector
 from lic_drake.select.objective import SuccessModel
+from lic_drake.select.planar_lic import PlanarLic
+from lic_drake.select.pointing_lic import PointingLic
 from lic_drake.select.situation import Selection, Situation
 
 
@@ -86,7 +89,7 @@ def needs_library(method: str) -> bool:
 
 def make_selector(
     method: str,
-    arm: PlanarArm,
+    arm: Arm,
     columns: Mapping[str, NDArray[Any]] | None = None,
     rng: np.random.Generator | None = None,
     category: str = "cylinder-clutter",
@@ -116,7 +119,9 @@ def make_selector(
         )
     if not needs_library(method):
         rng = np.random.default_rng(0) if rng is None else rng
-        return RandomSelector(rng=rng) if method == "rnd" else CostSelector()
+        if method == "rnd":
+            return RandomSelector(rng=rng)
+        return CostSelector(p_RS=arm.p_RS - [0.0, 0.0, arm.torso_m])
     if columns is None:
         raise RequestError(f"method {method!r} needs an experience library to learn from")
     features, only_first = features_of(category), method not in estimator_names()
@@ -125,7 +130,12 @@ def make_selector(
     if not only_first:
         pairs = pair_reaches(columns) if pairs is None else pairs
         second = fit_model(estimator, features.second, pairs)
-    return LicSelector(arm, fit_model(estimator, features.first, columns), second, method=method)
+    first_model = fit_model(estimator, features.first, columns)
+    if isinstance(arm, PlanarArm):
+        return PlanarLic(arm, first_model, second, method=method)
+    if isinstance(arm, Pr2Arm):
+        return PointingLic(first_model, second, method=method)
+    raise RequestError(f"no selection is known for the robot {arm.name!r}")
 
 
 def fit_model(

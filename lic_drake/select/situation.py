@@ -9,13 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lic_drake.errors import RequestError
-from lic_drake.reach.request import ReachRecord
-from lic_drake.reach.starts import InitialConditions, Region, Starts
+from lic_drake.experience.second_reach import SHOWN
+from lic_drake.reach.initial_conditions import InitialConditions
+from lic_drake.reach.request import IN_PLANE, ReachRecord
+from lic_drake.reach.starts import ApertureStarts, LineStarts, Region, Starts
 
 Vector = NDArray[np.float64]
 
 RETRY_DISTANCES_M = (0.1, 0.05, 0.025, 0.0, -1.0)
-"""A further attempt starts more than the first of these from all failed ones along y: the "local
+"""A further attempt starts more than the first of these from all failed ones across x: the "local
 neighborhood" of paper VI-A, whose size it does not state; one grid step. Where that leaves no
 start, after many failures, the next of them counts; -1 excludes nothing."""
 
@@ -25,29 +27,35 @@ class FailedReach:
     """What a reach that failed showed (paper III-C), all in W.
 
     Attributes:
-        x0: Hand pose (x, y, phi) that it began with, shape (3,), metres and radians.
+        x0: Hand pose that it began with, shape (3,), or (7,) in space.
         p_WR: Its base, shape (2,), metres.
-        shown: Values that an observation o may be made of, by the names of the records' columns:
-            start_x, start_y, start_phi and, if it began at all, final_x, final_y, final_phi,
-            final_vx, final_vy.
+        shown: Values that an observation o may be made of, by the names of the records' columns,
+            see `lic_drake.experience.second_reach.SHOWN`; the final ones are only there if it
+            began at all.
+        torso_m: Height of its torso, metres.
     """
 
     x0: Vector
     p_WR: Vector
     shown: Mapping[str, float]
+    torso_m: float = 0.0
 
     @classmethod
-    def from_start(cls, x0: Vector, p_WR: Vector | None = None) -> Self:
+    def from_start(cls, x0: Vector, p_WR: Vector | None = None, torso_m: float = 0.0) -> Self:
         """Returns a failure of which nothing but its initial condition is known."""
-        shown = dict(zip(("start_x", "start_y", "start_phi"), x0.tolist(), strict=True))
-        return cls(x0=x0, p_WR=np.zeros(2) if p_WR is None else p_WR, shown=shown)
+        axes = ("x", "y", "phi") if len(x0) == IN_PLANE else ("x", "y", "z", "qw", "qx", "qy", "qz")
+        shown = {f"start_{axis}": float(value) for axis, value in zip(axes, x0, strict=True)}
+        return cls(x0=x0, p_WR=np.zeros(2) if p_WR is None else p_WR, shown=shown, torso_m=torso_m)
 
     @classmethod
     def from_record(cls, record: ReachRecord) -> Self:
         """Returns what a record says of a failed reach."""
-        names = ("start_x", "start_y", "start_phi", "final_x", "final_y", "final_phi")
-        shown = {name: getattr(record, name) for name in (*names, "final_vx", "final_vy")}
-        return cls(x0=record.x0, p_WR=np.array([record.base_x, record.base_y]), shown=shown)
+        return cls(
+            x0=record.x0,
+            p_WR=np.array([record.base_x, record.base_y]),
+            shown={name: getattr(record, name) for name in SHOWN},
+            torso_m=record.torso,
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,7 +78,7 @@ class Situation:
 
     @cached_property
     def retry_distance_m(self) -> float:
-        """How far from failed attempts a further one starts, along y, metres."""
+        """How far from failed attempts a further one starts, across x, metres."""
         return next(
             (d for d in RETRY_DISTANCES_M if np.any(self._away(self.starts.grid, d))),
             RETRY_DISTANCES_M[-1],
@@ -88,16 +96,30 @@ class Situation:
         return self._away(conditions, RETRY_DISTANCES_M[-1])
 
     def _away(self, conditions: InitialConditions, distance_m: float) -> NDArray[np.bool_]:
-        away = np.ones(len(conditions.x0), dtype=bool)
+        away = np.ones(len(conditions), dtype=bool)
         for failed in self.failed:
             same_pose = np.all(np.isclose(conditions.x0, failed.x0), axis=1)
-            away &= ~(same_pose & np.all(np.isclose(conditions.p_WR, failed.p_WR), axis=1))
-            away &= np.abs(conditions.x0[:, 1] - failed.x0[1]) > distance_m + 1e-9
+            b0 = [*failed.p_WR, failed.torso_m]
+            away &= ~(same_pose & np.all(np.isclose(conditions.b0, b0), axis=1))
+            across = slice(1, 2 if len(failed.x0) == IN_PLANE else 3)
+            apart = np.linalg.norm(conditions.x0[:, across] - failed.x0[across], axis=1)
+            away &= apart > distance_m + 1e-9
         return away
 
+    @property
+    def planar_starts(self) -> LineStarts | ApertureStarts:
+        """The starts of a planar arm.
+
+        Raises:
+            RequestError: The robot reaches in space.
+        """
+        if not isinstance(self.starts, LineStarts | ApertureStarts):
+            raise RequestError("this needs the start line of a planar arm; the robot has another")
+        return self.starts
+
     def free_regions(self) -> tuple[Region, ...]:
-        """Returns the parts of the starts' regions that are away from all failed attempts."""
-        regions = self.starts.regions
+        """Returns the parts of a planar arm's regions that are away from all failed attempts."""
+        regions = self.planar_starts.regions
         if self.retry_distance_m < 0.0:
             return regions
         margin = self.retry_distance_m + 1e-6
@@ -115,12 +137,13 @@ class Selection:
     """A chosen initial condition.
 
     Attributes:
-        x0: Hand pose (x, y, phi) in W, metres and radians.
+        x0: Hand pose in W, (x, y, phi), or in space position and quaternion, metres and radians.
         p_WR: Base, shape (2,), metres.
         q: Joint angles that take it, shape (m,), radians.
         probability: Estimated probability of success; None for strategies without an estimate.
         method: Name of the strategy.
         seconds: Wall time of the selection.
+        torso_m: Height of the torso, metres; 0 for a robot without one.
     """
 
     x0: Vector
@@ -129,6 +152,7 @@ class Selection:
     probability: float | None
     method: str
     seconds: float
+    torso_m: float = 0.0
 
 
 def _clip(region: Region, lower: float = -np.inf, upper: float = np.inf) -> Region:

@@ -1,4 +1,4 @@
-"""The constrained optimisation of Eqs. (3) and (4) as a Drake MathematicalProgram."""
+"""The constrained optimisation of Eqs. (3) and (4) for a planar arm, a MathematicalProgram."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from lic_drake.select.objective import Objective
 Vector = NDArray[np.float64]
 
 
-class StartProgram:
+class PlanarProgram:
     """Maximise F(T_b0(s), x0) over the start pose x0, the base b0 and the arm's joint angles q.
 
     Decision variables are x0 = (x, y, phi) and b0 = (x, y), both in W, and q; constraints are the
@@ -70,10 +70,12 @@ class StartProgram:
         """Evaluates -F for numbers and for AutoDiffXd."""
         assert self._objective is not None
         values = _values(x0_b0)
-        value, by_x0, by_b0 = self._objective.value_and_gradient(values[:3], values[3:])
+        value, by_x0, by_b0 = self._objective.value_and_gradient(
+            values[:3], np.append(values[3:], 0.0)
+        )
         if x0_b0.dtype != object:
             return -value
-        return AutoDiffXd(-value, -np.append(by_x0, by_b0) @ ExtractGradient(x0_b0))
+        return AutoDiffXd(-value, -np.append(by_x0, by_b0[:2]) @ ExtractGradient(x0_b0))
 
     def _hand_error(self, x0_b0_q: NDArray[np.generic]) -> object:
         """Evaluates b0 + FK(q) - x0 for numbers and for AutoDiffXd."""
