@@ -9,8 +9,12 @@ from numpy.typing import NDArray
 from lic_drake.errors import LibraryError
 from lic_drake.experience.second_reach import FIRST_PREFIX, SHOWN
 
-_VALUES = 5
-"""Numbers for each earlier reach in a record's `after`: its start pose and its base."""
+_IN_PLANE = ("start_x", "start_y", "start_phi", "base_x", "base_y")
+_IN_SPACE = (
+    *("start_x", "start_y", "start_z", "start_qw", "start_qx", "start_qy", "start_qz"),
+    *("base_x", "base_y", "torso"),
+)
+"""Numbers for each earlier reach in a record's `after`: its start pose and what carried the arm."""
 
 
 def pair_real_attempts(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
@@ -27,13 +31,13 @@ def pair_real_attempts(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray
         LibraryError: There is no second attempt, or one without the first attempt before it.
     """
     lengths = np.array([len(after) for after in columns["after"]], dtype=int)
-    start = ("start_x", "start_y", "start_phi", "base_x", "base_y")
+    start = _IN_SPACE if len(_IN_SPACE) in lengths else _IN_PLANE
     task = ("stream", "environment", "goal_x", "goal_y", "goal_z")
     first_of = {
         (*(columns[name][i] for name in task), *(float(columns[name][i]) for name in start)): i
         for i in np.flatnonzero(lengths == 0)
     }
-    second = np.flatnonzero(lengths == _VALUES)
+    second = np.flatnonzero(lengths == len(start))
     if len(second) == 0:
         raise LibraryError(
             "the library holds no second attempts; scripts/collect_second_attempts.py makes some"

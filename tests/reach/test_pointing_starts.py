@@ -2,20 +2,29 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pr2_reaches import ARM, SCENARIO
+from pr2_reaches import SCENARIO
 from pr2_reference import link_poses
 
 from lic_drake.clutter.instance import ClutterInstance
-from lic_drake.errors import RequestError, ScenarioError
+from lic_drake.errors import ScenarioError
 from lic_drake.reach.environment import Environment
-from lic_drake.reach.pointing_starts import PointingStarts, find_pointing_starts
-from lic_drake.reach.scenario import load_scenario
-from lic_drake.reach.starts import training_starts
+from lic_drake.reach.pointing_starts import (
+    PointingStarts,
+    mobile_positions,
+    pointing_starts,
+    standing_at,
+)
+from lic_drake.reach.scenario import Scenario, load_scenario
+from lic_drake.reach.starts import make_starts, training_starts
+from lic_drake.robots.pr2 import Pr2Arm
 from lic_drake.robots.pr2_inverse import calc_preselection_cost, solve_pointing
 from lic_drake.scene.collision import CollisionChecker
 
 INSTANCE = SCENARIO.sample_instance("training", 0)
-STARTS = find_pointing_starts(SCENARIO, INSTANCE)
+STILL = pointing_starts(SCENARIO, INSTANCE)
+BLOCKED = load_scenario("sphere-aperture-clutter", "{clutter: {num_blocked: 12}}")
+STAND = SCENARIO.task.stand
+assert STAND is not None
 
 
 def apertures_of(instance: ClutterInstance) -> np.ndarray:
@@ -23,95 +32,121 @@ def apertures_of(instance: ClutterInstance) -> np.ndarray:
     return instance.p_WA
 
 
-def test_the_tool_is_in_the_centre_of_its_aperture_and_points_in() -> None:
-    assert len(STARTS.x0) == len(set(STARTS.aperture)) == 19
-    for aperture, x0, q in zip(STARTS.aperture, STARTS.x0, STARTS.q, strict=True):
-        X_WE = link_poses((0.0, 0.0, 0.0), SCENARIO.task.torso_m, q)[7]
-        np.testing.assert_allclose(X_WE[:3, 3], apertures_of(INSTANCE)[aperture], atol=1e-9)
+def arm_of(scenario: Scenario, torso_m: float) -> Pr2Arm:
+    arm = scenario.arm(torso_m)
+    assert isinstance(arm, Pr2Arm)
+    return arm
+
+
+def assert_points_in(starts: PointingStarts, rows: np.ndarray) -> None:
+    """The tool, by kinematics that do not read the model, is in an open aperture, along x."""
+    grid = starts.grid
+    for x0, b0, q in zip(grid.x0[rows], grid.b0[rows], starts.grid_angles[rows], strict=True):
+        X_WE = link_poses((b0[0], b0[1], 0.0), b0[2], q)[7]
+        np.testing.assert_allclose(X_WE[:3, 3], x0[:3], atol=1e-9)
         np.testing.assert_allclose(X_WE[:3, 0], [1.0, 0.0, 0.0], atol=1e-9)
-        np.testing.assert_allclose(x0[:3], X_WE[:3, 3], atol=1e-9)
+        assert np.min(np.linalg.norm(starts.p_WA - x0[:3], axis=1)) < 1e-9
         w, x, y, z = x0[3:]
         axis = [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)]
         np.testing.assert_allclose(axis, [1.0, 0.0, 0.0], atol=1e-9)
-        assert np.all(q >= ARM.q_min - 1e-9)
-        assert np.all(q <= ARM.q_max + 1e-9)
+        arm = arm_of(SCENARIO, b0[2])
+        assert np.all(q >= arm.q_min - 1e-9)
+        assert np.all(q <= arm.q_max + 1e-9)
+
+
+def test_a_robot_that_stays_has_a_start_in_the_centre_of_each_aperture() -> None:
+    assert len(STILL.grid) == 20
+    np.testing.assert_allclose(STILL.grid.x0[:, :3], apertures_of(INSTANCE))
+    np.testing.assert_array_equal(STILL.grid.b0, np.tile([0.0, 0.0, 0.15], (20, 1)))
+    assert_points_in(STILL, np.arange(20))
+
+
+def test_a_robot_that_moves_has_them_from_everywhere_in_its_range() -> None:
+    starts = make_starts(SCENARIO, INSTANCE)
+    assert isinstance(starts, PointingStarts)
+    assert 700 < len(starts.grid) <= 20 * 7 * 7
+    low, high = starts.grid.b0.min(axis=0), starts.grid.b0.max(axis=0)
+    np.testing.assert_allclose(low, [0.0, STAND.y_min_m, STAND.torso_min_m])
+    np.testing.assert_allclose(high, [0.0, STAND.y_max_m, STAND.torso_max_m])
+    assert_points_in(starts, np.arange(0, len(starts.grid), 40))
 
 
 def test_a_reach_begins_with_the_preselected_configuration() -> None:
     short = load_scenario("sphere-aperture-clutter", "{stop: {timeout_s: 0.04}}")
+    conditions, angles = STILL.grid, STILL.grid_angles
     environment = Environment(short, INSTANCE)
     p_WG = SCENARIO.goals("training", 0)[4]
-    for x0, q in zip(STARTS.x0, STARTS.q, strict=True):
+    for x0, q in zip(conditions.x0[::4], angles[::4], strict=True):
         result = environment.reach(p_WG, x0)
         assert result.outcome == "timeout", result.detail
         np.testing.assert_allclose(result.trace.q[0], q, atol=1e-6)
 
 
 def test_no_other_configuration_without_contact_costs_less() -> None:
-    checker = CollisionChecker(ARM, INSTANCE, SCENARIO.scene)
+    arm = arm_of(SCENARIO, 0.15)
+    checker = CollisionChecker(arm, INSTANCE, SCENARIO.scene)
     for k in (0, 7, 13):
-        assert not checker.touches(STARTS.q[k])
-        p_RE = apertures_of(INSTANCE)[STARTS.aperture[k]]
-        others = solve_pointing(ARM.kinematics, p_RE, np.array([1.0, 0.0, 0.0]))
-        cost = calc_preselection_cost(ARM.kinematics, others)
-        least = calc_preselection_cost(ARM.kinematics, STARTS.q[k][None])[0]
-        assert all(checker.touches(q) for q in others[cost < least - 1e-12])
+        q = STILL.grid_angles[k]
+        assert not checker.touches(q)
+        others = solve_pointing(arm.kinematics, STILL.grid.x0[k, :3], np.array([1.0, 0.0, 0.0]))
+        cost = calc_preselection_cost(arm.kinematics, others)
+        least = calc_preselection_cost(arm.kinematics, q[None])[0]
+        assert all(checker.touches(row) for row in others[cost < least - 1e-12])
 
 
-def test_blocked_apertures_have_no_start() -> None:
-    blocked = load_scenario("sphere-aperture-clutter", "{clutter: {num_blocked: 16}}")
-    instance = blocked.sample_instance("training", 3)
-    starts = find_pointing_starts(blocked, instance)
-    assert 1 <= len(starts.x0) <= 4
-    np.testing.assert_allclose(starts.x0[:, :3], apertures_of(instance)[starts.aperture], atol=1e-9)
+def test_angles_are_those_of_the_grid_and_none_where_the_robot_cannot_start() -> None:
+    starts = make_starts(SCENARIO, INSTANCE)
+    assert isinstance(starts, PointingStarts)
+    grid = starts.grid
+    for k in range(0, len(grid), 97):
+        q = starts.angles(grid.x0[k], grid.p_WR[k], grid.torso_m[k])
+        assert q is not None
+        np.testing.assert_allclose(q, starts.grid_angles[k], atol=1e-6)
+    x0, p_WR, torso_m = grid.x0[0], grid.p_WR[0], float(grid.torso_m[0])
+    assert starts.angles(x0, p_WR + [0.0, 1.0], torso_m) is None
+    assert starts.angles(x0, p_WR + [0.1, 0.0], torso_m) is None
+    assert starts.angles(x0, p_WR, 0.305 + 1e-4) is None
+    assert starts.angles(x0 + np.pad([0.01], (1, 5)), p_WR, torso_m) is None
+
+
+def test_blocked_apertures_have_no_start_and_no_arm_stands_in_what_blocks_them() -> None:
+    instance = BLOCKED.sample_instance("training", 3)
+    starts = make_starts(BLOCKED, instance)
+    assert isinstance(starts, PointingStarts)
+    assert len(starts.p_WA) == 8
+    assert len(starts.all_apertures) == 20
+    assert starts.aperture_m == pytest.approx(0.2)
+    whole = make_starts(SCENARIO, INSTANCE)
+    here = [np.min(np.linalg.norm(starts.p_WA - x0[:3], axis=1)) < 1e-9 for x0 in whole.grid.x0]
+    assert 0 < len(starts.grid) <= sum(here)
+    for k in range(0, len(starts.grid), 29):
+        carried = mobile_positions(starts.grid.b0[k], starts.grid_angles[k : k + 1])
+        assert not starts.checker.touches(carried[0])
 
 
 def test_a_robot_that_moves_with_its_environment_starts_alike() -> None:
-    p_WR = np.array([0.2, -0.3])
-    moved = find_pointing_starts(SCENARIO, INSTANCE.translated(np.append(p_WR, 0.0)), p_WR)
-    np.testing.assert_allclose(moved.q, STARTS.q, atol=1e-6)
-    shift = np.tile(np.append(p_WR, np.zeros(5)), (19, 1))
-    np.testing.assert_allclose(moved.x0 - STARTS.x0, shift, atol=1e-9)
-
-
-def test_another_torso_height_is_another_start_of_the_same_tool_position() -> None:
-    raised = find_pointing_starts(SCENARIO, INSTANCE, torso_m=0.1)
-    assert len(raised.x0) == 20
-    assert raised.torso_m == 0.1
-    np.testing.assert_allclose(raised.x0[:, :3], apertures_of(INSTANCE), atol=1e-9)
-    X_WE = link_poses((0.0, 0.0, 0.0), 0.1, raised.q[3])[7]
-    np.testing.assert_allclose(X_WE[:3, 3], apertures_of(INSTANCE)[3], atol=1e-9)
-
-
-def test_rnd_draws_all_of_them_alike_but_for_those_that_failed() -> None:
-    rng = np.random.default_rng(0)
-    drawn = [STARTS.draw(rng) for _ in range(1900)]
-    counts = np.bincount(drawn, minlength=19)
-    assert counts.min() > 60  # 100 expected, standard deviation 9.7.
-    assert counts.max() < 140
-    failed = np.arange(18)
-    assert {STARTS.draw(rng, failed) for _ in range(10)} == {18}
-    with pytest.raises(RequestError, match="no aperture that has not been tried"):
-        STARTS.draw(rng, np.arange(19))
-    nothing = PointingStarts(
-        aperture=np.zeros(0, dtype=np.intp),
-        x0=np.zeros((0, 7)),
-        q=np.zeros((0, 7)),
-        p_WR=np.zeros(2),
-        torso_m=0.15,
+    """The translation T_b0 of Eq. (3)."""
+    moved = pointing_starts(SCENARIO, INSTANCE, standing_at(-0.05, 0.15)).grid
+    other = load_scenario(
+        "sphere-aperture-clutter", "{clutter: {board_centre: [0.53, -0.24, 0.89]}}"
     )
-    with pytest.raises(RequestError, match="no aperture"):
-        nothing.draw(rng)
+    still = pointing_starts(other, other.sample_instance("training", 0)).grid
+    np.testing.assert_allclose(moved.in_R, still.in_R, atol=1e-9)
 
 
-def test_a_collection_tries_them_all() -> None:
-    x0, p_WR = training_starts(SCENARIO, "training", 0)
-    np.testing.assert_array_equal(x0, STARTS.x0)
-    np.testing.assert_array_equal(p_WR, np.zeros((19, 2)))
+def test_a_collection_tries_them_all_from_one_stand_an_environment() -> None:
+    stands = set()
+    for environment in range(16):
+        tried = training_starts(SCENARIO, "training", environment)
+        assert 19 <= len(tried) <= 20
+        (b0,) = {tuple(row) for row in tried.b0.tolist()}
+        assert b0[1:] == STAND.for_training(environment)
+        stands.add(b0)
+    assert len(stands) == 8
 
 
 def test_robots_and_environments_without_such_starts_are_refused() -> None:
-    with pytest.raises(ScenarioError, match="need the robot pr2 and apertures"):
-        find_pointing_starts(load_scenario("cylinder-aperture-clutter"), INSTANCE)
-    with pytest.raises(ScenarioError, match="need the robot pr2 and apertures"):
-        find_pointing_starts(SCENARIO, replace(INSTANCE, p_WA=None))
+    with pytest.raises(ScenarioError, match="need the robot pr2 and a board"):
+        pointing_starts(load_scenario("cylinder-aperture-clutter"), INSTANCE)
+    with pytest.raises(ScenarioError, match="need the robot pr2 and a board"):
+        pointing_starts(SCENARIO, replace(INSTANCE, p_WA=None))

@@ -1,0 +1,170 @@
+import numpy as np
+import pytest
+from pr2_reaches import SCENARIO
+from pr2_reference import link_poses
+
+from lic_drake.errors import RequestError
+from lic_drake.estimate.features import SPACE_LIC1
+from lic_drake.experience.second_reach import SHOWN
+from lic_drake.reach.initial_conditions import InitialConditions
+from lic_drake.reach.pointing_starts import PointingStarts, pointing_starts
+from lic_drake.reach.scenario import load_scenario
+from lic_drake.reach.starts import make_starts, planar_starts
+from lic_drake.select.baselines import CostSelector, RandomSelector, corridor_cost
+from lic_drake.select.objective import SuccessModel
+from lic_drake.select.pointing_lic import PointingLbfgsb, PointingLic
+from lic_drake.select.registry import make_selector
+from lic_drake.select.situation import FailedReach, Situation
+
+BLOCKED = load_scenario("sphere-aperture-clutter", "{clutter: {num_blocked: 10}}")
+
+
+class Ridge:
+    """Estimates that fall with the distance of the start from a place in the robot's frame."""
+
+    def values(self, Z: np.ndarray) -> np.ndarray:
+        return np.asarray(np.exp(-np.abs(Z - [0.0, 0.0, -0.33, 0.8, 0.3]) @ self.scale))
+
+    def value_and_gradient(self, z: np.ndarray) -> tuple[float, np.ndarray]:
+        value = float(self.values(z[None])[0])
+        return value, -value * self.scale * np.sign(z - [0.0, 0.0, -0.33, 0.8, 0.3])
+
+    scale = np.array([0.0, 0.0, 3.0, 3.0, 0.3])
+
+
+MODEL = SuccessModel(estimator=Ridge(), features=SPACE_LIC1)  # type: ignore[arg-type]
+
+
+def situation(environment: int, *failed: FailedReach) -> Situation:
+    starts = make_starts(BLOCKED, BLOCKED.sample_instance("holdout", environment))
+    return Situation(p_WG=BLOCKED.sample_goal("holdout", environment), starts=starts, failed=failed)
+
+
+def starts_of(asked: Situation) -> PointingStarts:
+    assert isinstance(asked.starts, PointingStarts)
+    return asked.starts
+
+
+@pytest.mark.parametrize("kind", [PointingLic, PointingLbfgsb])
+@pytest.mark.parametrize("environment", range(4))
+def test_the_answer_is_possible_and_at_least_the_best_of_the_grid(
+    kind: type[PointingLic], environment: int
+) -> None:
+    asked = situation(environment)
+    selector = kind(MODEL)
+    chosen = selector.select(asked)
+    # By kinematics that do not read the model.
+    X_WE = link_poses((*chosen.p_WR, 0.0), chosen.torso_m, chosen.q)[7]
+    np.testing.assert_allclose(X_WE[:3, 3], chosen.x0[:3], atol=1e-9)
+    np.testing.assert_allclose(X_WE[:3, 0], [1.0, 0.0, 0.0], atol=1e-9)
+    assert np.min(np.linalg.norm(starts_of(asked).p_WA - chosen.x0[:3], axis=1)) < 1e-9
+    condition = InitialConditions(chosen.x0[None], chosen.p_WR[None], np.array([chosen.torso_m]))
+    objective = selector.objective(asked)
+    value = objective.values(condition)[0]
+    assert value == pytest.approx(chosen.probability)
+    assert value >= objective.values(asked.starts.grid).max()
+    assert chosen.seconds < 10.0
+
+
+def test_the_optimisation_gains_over_the_grid() -> None:
+    gains = []
+    for environment in range(4):
+        asked = situation(environment)
+        best = PointingLic(MODEL).objective(asked).values(asked.starts.grid).max()
+        chosen = PointingLic(MODEL).select(asked)
+        assert chosen.probability is not None
+        gains.append(chosen.probability - best)
+    assert max(gains) > 0.02
+
+
+def test_a_translated_situation_has_a_translated_answer() -> None:
+    """Board, goal and the range of the base move 0.1 m to the left: so does the answer."""
+    clutter = "{{clutter: {{board_centre: [0.53, {0}, 0.89]}}, task: {{stand: {{y_min_m: {1},"
+    clutter += " y_max_m: {2}}}}}}}"
+    chosen = []
+    for shift in (0.0, 0.1):
+        scenario = load_scenario(
+            "sphere-aperture-clutter", clutter.format(-0.29 + shift, -0.2 + shift, 0.2 + shift)
+        )
+        starts = make_starts(scenario, scenario.sample_instance("holdout", 0))
+        asked = Situation(p_WG=np.array([0.84, -0.2 + shift, 0.9]), starts=starts)
+        chosen.append(PointingLic(MODEL).select(asked))
+    here, there = chosen
+    np.testing.assert_allclose(there.x0 - here.x0, [0.0, 0.1, *np.zeros(5)], atol=2e-4)
+    np.testing.assert_allclose(there.p_WR - here.p_WR, [0.0, 0.1], atol=2e-4)
+    assert there.torso_m == pytest.approx(here.torso_m, abs=2e-4)
+    assert there.probability == pytest.approx(here.probability, abs=1e-4)
+
+
+def test_without_lic_2_a_further_attempt_goes_through_another_aperture() -> None:
+    first = PointingLic(MODEL).select(situation(0))
+    failed = FailedReach.from_start(first.x0, first.p_WR, first.torso_m)
+    second = PointingLic(MODEL).select(situation(0, failed))
+    assert np.linalg.norm(second.x0[:3] - first.x0[:3]) > 0.19
+
+
+def test_lic_2_knows_where_the_first_reach_began() -> None:
+    features = SPACE_LIC1
+    observed = ("first_start_y", "first_start_z")
+
+    class Away:
+        """Likes to begin far from where the first reach began."""
+
+        def values(self, Z: np.ndarray) -> np.ndarray:
+            return np.asarray(np.linalg.norm(Z[:, 4:6] - Z[:, 2:4], axis=1))
+
+        def value_and_gradient(self, z: np.ndarray) -> tuple[float, np.ndarray]:
+            apart = z[4:6] - z[2:4]
+            gradient = np.zeros(7)
+            gradient[4:6] = apart / np.linalg.norm(apart)
+            gradient[2:4] = -gradient[4:6]
+            return float(np.linalg.norm(apart)), gradient
+
+    model = SuccessModel(
+        estimator=Away(),  # type: ignore[arg-type]
+        features=type(features)(goal=features.goal, start=features.start, observed=observed),
+    )
+    asked = situation(1)
+    p_WA = starts_of(asked).p_WA
+    k = 0
+    x0 = np.array([*p_WA[k], 1.0, 0.0, 0.0, 0.0])
+    shown = dict.fromkeys(SHOWN, 0.0) | {"start_y": x0[1], "start_z": x0[2]}
+    failed = FailedReach(x0=x0, p_WR=np.array([0.0, 0.1]), shown=shown, torso_m=0.2)
+    chosen = PointingLic(MODEL, model).select(situation(1, failed))
+    reachable = np.unique(asked.starts.grid.x0[:, :3], axis=0)
+    farthest = reachable[np.argmax(np.linalg.norm(reachable - x0[:3], axis=1))]
+    np.testing.assert_allclose(chosen.x0[:3], farthest)
+
+
+def test_rnd_draws_among_all_and_cost_takes_the_nearest_aperture_to_the_goal() -> None:
+    asked = situation(2)
+    rng = np.random.default_rng(0)
+    drawn = [RandomSelector(rng=rng).select(asked) for _ in range(60)]
+    assert len({tuple(chosen.x0[:3]) for chosen in drawn}) >= 8
+    assert len({chosen.torso_m for chosen in drawn}) >= 5
+    cost = make_selector("cost", BLOCKED.arm())
+    assert isinstance(cost, CostSelector)
+    np.testing.assert_allclose(cost.p_RS, [-0.05, -0.188, 0.790675], atol=1e-9)
+    chosen = cost.select(asked)
+    costs = corridor_cost(asked.starts.grid.x0, asked.p_WG)
+    assert corridor_cost(chosen.x0[None], asked.p_WG)[0] == pytest.approx(costs.min())
+    # Of the same aperture the place from which the shoulder is nearest to the goal across x.
+    same = asked.starts.grid.take(np.isclose(costs, costs.min()))
+    aside = np.linalg.norm((same.b0 + cost.p_RS - asked.p_WG)[:, 1:], axis=1)
+    mine = np.array([*chosen.p_WR, chosen.torso_m]) + cost.p_RS - asked.p_WG
+    assert np.linalg.norm(mine[1:]) == pytest.approx(aside.min())
+
+
+def test_a_planar_situation_is_refused() -> None:
+    plane = load_scenario("cylinder-clutter")
+    starts = planar_starts(plane, plane.sample_instance("holdout", 0))
+    with pytest.raises(RequestError, match="needs a PR2 before a board"):
+        PointingLic(MODEL).select(Situation(p_WG=np.array([0.6, 0.0, 0.0]), starts=starts))
+
+
+def test_a_robot_that_stays_can_still_choose_its_aperture() -> None:
+    instance = SCENARIO.sample_instance("holdout", 0)
+    starts = pointing_starts(SCENARIO, instance)
+    chosen = PointingLic(MODEL).select(Situation(p_WG=np.array([0.84, -0.2, 0.9]), starts=starts))
+    np.testing.assert_array_equal(chosen.p_WR, [0.0, 0.0])
+    assert chosen.torso_m == 0.15
