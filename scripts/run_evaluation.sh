@@ -37,7 +37,7 @@ evaluate cylinder-clutter 200 10 --methods gp --variant real-pairs \
 # Five attempts.
 evaluate cylinder-clutter 50 10 --methods rnd cost gp --attempts 5 --variant five-attempts
 
-# Bounds, and the strategies on the same goals.
+# Bounds, and LIC's two attempts at the same goals.
 python scripts/measure_bounds.py cylinder-clutter --stream holdout --environments 40 --goals 10 \
     --common-goals
 python scripts/measure_bounds.py passage-clutter --stream holdout --environments 300
@@ -45,7 +45,8 @@ python scripts/measure_bounds.py cylinder-aperture-clutter --stream evaluation -
 evaluate_on_bounds() {
     category=$1
     shift
-    lic evaluate "$results/bounds/$category" --library "models/experience/$category" "$@"
+    lic evaluate "$results/bounds/$category" --library "models/experience/$category" \
+        --methods gp "$@"
 }
 evaluate_on_bounds cylinder-clutter --stream holdout --common-goals --environments 40 --goals 10
 evaluate_on_bounds passage-clutter --stream holdout --environments 300

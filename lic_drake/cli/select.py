@@ -2,6 +2,7 @@
 
 import argparse
 import json
+from typing import TYPE_CHECKING
 
 from lic_drake.cli.arguments import (
     Subparsers,
@@ -9,6 +10,11 @@ from lic_drake.cli.arguments import (
     add_method_argument,
     non_negative_int,
 )
+
+if TYPE_CHECKING:
+    from lic_drake.reach.scenario import Scenario
+    from lic_drake.reach.starts import Starts
+    from lic_drake.select.situation import FailedReach
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -18,15 +24,16 @@ def add_parser(subparsers: Subparsers) -> None:
         help="choose the start pose of a reach",
         description="Chooses the start pose for a goal from an experience library and prints it"
         " with its estimated probability of success.",
-        epilog="example: lic select --goal 0.6 0.1 --method gp",
+        epilog="examples: lic select --goal 0.6 0.1 --method knn; lic select --goal 0.84 -0.2 0.9"
+        " --library models/experience/sphere-aperture-clutter",
     )
     parser.add_argument(
         "--goal",
         type=float,
-        nargs=2,
+        nargs="+",
         required=True,
-        metavar=("X", "Y"),
-        help="goal in metres (no default: must be given)",
+        metavar="METRES",
+        help="goal, X Y or for the PR2 X Y Z, in metres (no default: must be given)",
     )
     add_method_argument(parser)
     parser.add_argument(
@@ -36,8 +43,8 @@ def add_parser(subparsers: Subparsers) -> None:
         action="append",
         default=[],
         metavar=("Y", "DEG"),
-        help="start (metres, degrees) of an attempt that failed; may be given several times"
-        " (default: none)",
+        help="start (metres, degrees) of an attempt that failed, for the PR2 the aperture (Y, Z) in"
+        " metres; may be given several times (default: none)",
     )
     add_library_argument(parser)
     parser.add_argument(
@@ -53,29 +60,32 @@ def run(args: argparse.Namespace) -> int:
     """Runs the subcommand and returns the exit code."""
     import numpy as np
 
+    from lic_drake.errors import RequestError
     from lic_drake.experience.store import ExperienceLibrary
     from lic_drake.paths import shipped_library
     from lic_drake.reach.request import check_goal
     from lic_drake.reach.starts import make_starts
     from lic_drake.select.registry import make_selector, needs_library
-    from lic_drake.select.situation import FailedReach, Situation
+    from lic_drake.select.situation import Situation
 
     needs_library(args.method)
     library = ExperienceLibrary(args.library or shipped_library("cylinder-clutter"))
     scenario = library.scenario()
-    p_WG = np.array([*args.goal, 0.0])
-    arm = scenario.arm()
-    starts = make_starts(scenario, scenario.sample_instance("evaluation", args.seed))
-    bases = starts.grid.p_WR
-    nearest = bases[np.argmin(np.linalg.norm(bases - p_WG[:2], axis=1))]
-    check_goal(scenario, p_WG - [*nearest, 0.0])
-    failed = tuple(
-        FailedReach.from_start(np.array([scenario.task.start_line.x_m, y, np.deg2rad(phi)]))
-        for y, phi in args.failed
-    )
+    instance = scenario.sample_instance("evaluation", args.seed)
+    if len(args.goal) != instance.num_axes:
+        raise RequestError(
+            f"a goal of {scenario.category} is {instance.num_axes} numbers in metres, got"
+            f" {len(args.goal)}: --goal {' '.join(map(str, args.goal))}"
+        )
+    p_WG = np.array([*args.goal, 0.0][:3])
+    starts = make_starts(scenario, instance)
+    stands = np.unique(starts.grid.b0, axis=0)
+    nearest = stands[np.argmin(np.linalg.norm((stands - p_WG)[:, 1:], axis=1))]
+    check_goal(scenario, p_WG - [*nearest[:2], 0.0], nearest[2])
+    failed = tuple(_failed_start(scenario, starts, *numbers) for numbers in args.failed)
     situation = Situation(p_WG=p_WG, starts=starts, failed=failed)
     rng = np.random.default_rng(args.seed)
-    selector = make_selector(args.method, arm, library.columns(), rng, scenario.category)
+    selector = make_selector(args.method, scenario.arm(), library.columns(), rng, scenario.category)
     chosen = selector.select(situation)
     if args.json:
         print(
@@ -84,6 +94,7 @@ def run(args: argparse.Namespace) -> int:
                     "method": chosen.method,
                     "start": chosen.x0.tolist(),
                     "base": chosen.p_WR.tolist(),
+                    "torso": chosen.torso_m,
                     "joint_angles": chosen.q.tolist(),
                     "estimated_success": chosen.probability,
                     "seconds": chosen.seconds,
@@ -96,10 +107,42 @@ def run(args: argparse.Namespace) -> int:
         if chosen.probability is None
         else f", estimated success {100 * chosen.probability:.1f} %"
     )
-    base = "" if scenario.task.base is None else f", base at y {chosen.p_WR[1]:+.3f} m"
+    base = "" if not np.any(starts.grid.p_WR) else f", base at y {chosen.p_WR[1]:+.3f} m"
+    if instance.num_axes == 2:
+        where = f"start at y {chosen.x0[1]:+.3f} m, phi {np.rad2deg(chosen.x0[2]):+.1f} degrees"
+    else:
+        where = (
+            f"start in the aperture at y {chosen.x0[1]:+.3f} m, z {chosen.x0[2]:.3f} m, torso at"
+            f" {chosen.torso_m:.3f} m"
+        )
     print(
-        f"{chosen.method}: start at y {chosen.x0[1]:+.3f} m, phi"
-        f" {np.rad2deg(chosen.x0[2]):+.1f} degrees{base}{estimate}; joint angles"
+        f"{chosen.method}: {where}{base}{estimate}; joint angles"
         f" {np.round(np.rad2deg(chosen.q), 1).tolist()} degrees; {chosen.seconds:.2f} s"
     )
     return 0
+
+
+def _failed_start(scenario: "Scenario", starts: "Starts", y: float, other: float) -> "FailedReach":
+    """Returns a failure that began at y and an angle in degrees, or in the aperture at (y, z).
+
+    Raises:
+        RequestError: There is no aperture.
+    """
+    import numpy as np
+
+    from lic_drake.errors import RequestError
+    from lic_drake.reach.pointing_starts import PointingStarts
+    from lic_drake.select.situation import FailedReach
+
+    if not isinstance(starts, PointingStarts):
+        x0 = np.array([scenario.task.start_line.x_m, y, np.deg2rad(other)])
+        return FailedReach.from_start(x0)
+    distance = np.linalg.norm(starts.p_WA[:, 1:] - [y, other], axis=1)
+    p_WA = starts.p_WA[np.argmin(distance)]
+    if distance.min() > 0.5 * starts.aperture_m:
+        raise RequestError(
+            f"there is no open aperture at y {y} m, z {other} m; the nearest is at y {p_WA[1]:.3f}"
+            f" m, z {p_WA[2]:.3f} m"
+        )
+    x0 = np.array([*p_WA, 1.0, 0.0, 0.0, 0.0])
+    return FailedReach.from_start(x0, torso_m=scenario.task.torso_m)

@@ -18,6 +18,7 @@ from lic_drake.evaluate.factorial import Factorial, load_factorial
 from lic_drake.evaluate.optima import chosen_rate
 from lic_drake.evaluate.paper import TABLES, label
 from lic_drake.evaluate.table import Table
+from lic_drake.evaluate.trials import TrialTable, read_trials
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 from lic_drake.select.baselines import corridor_cost
@@ -37,26 +38,30 @@ def bounds_tables(results: Path) -> list[Table]:
 
     Args:
         results: Folder of all records; `bounds/<category>/factorial` holds the reaches from all
-            discrete starts, see scripts/measure_bounds.py.
+            discrete starts, see scripts/measure_bounds.py, and `bounds/<category>/trials.parquet`
+            both attempts of strategies at the same goals, if there are any.
 
     Raises:
         LibraryError: Records are missing or damaged.
     """
     folders = {category: results / "bounds" / category / "factorial" for category in TABLES}
     return [
-        _apertures_table(folder, results) if category == APERTURES else _table(category, folder)
+        _apertures_table(folder, results)
+        if category == APERTURES
+        else _table(category, folder, results)
         for category, folder in folders.items()
         if folder.exists()
     ]
 
 
-def _table(category: str, folder: Path) -> Table:
+def _table(category: str, folder: Path, results: Path) -> Table:
     factorial = load_factorial(ExperienceLibrary(folder).columns())
     scores = {"cost": _cost_score(factorial)}
     for name in LEARNED:
         scores[name] = _model_score(_first_model(name, category), factorial)
     attained = {name: chosen_rate(factorial.success, score) for name, score in scores.items()}
-    return _with_strategies(compute_bounds(factorial), category, attained)
+    both = _both_attempts(results, category)
+    return _with_strategies(compute_bounds(factorial), category, attained, both)
 
 
 def _apertures_table(folder: Path, results: Path) -> Table:
@@ -67,24 +72,51 @@ def _apertures_table(folder: Path, results: Path) -> Table:
         scores[name] = _first_model(name, APERTURES).estimator.values(choices.Z)
     attained = {name: choices.chosen_rate(score) for name, score in scores.items()}
     reference = _experienced_model(results, columns).estimator.values(choices.Z)
-    return _with_strategies(choice_bounds(choices, reference), APERTURES, attained)
+    both = _both_attempts(results, APERTURES)
+    return _with_strategies(choice_bounds(choices, reference), APERTURES, attained, both)
 
 
-def _with_strategies(bounds: list[Bound], category: str, attained: Mapping[str, Vector]) -> Table:
-    """Returns the table of bounds with strategies' first attempts among them, in rising order.
+def _with_strategies(
+    bounds: list[Bound],
+    category: str,
+    attained: Mapping[str, Vector],
+    both: Mapping[str, Vector],
+) -> Table:
+    """Returns the table of bounds with strategies among them, in rising order.
 
     Args:
         bounds: The bounds.
         category: Clutter category.
-        attained: Success rate in each environment, shape (E,), by strategy.
+        attained: Success rate of first attempts in each environment, shape (E,), by strategy.
+        both: The same of both attempts, from all starts, not only discrete ones.
     """
     strategies = [
         Bound(name=f"{label(name)}, discrete starts", attempts=1, by_environment=rate)
         for name, rate in attained.items()
     ]
+    strategies += [
+        Bound(name=f"{label(name)}, LIC-1 and LIC-2", attempts=2, by_environment=rate)
+        for name, rate in both.items()
+    ]
     rates = {label(name): {1: float(rate.mean())} for name, rate in attained.items()}
+    for name, rate in both.items():
+        rates.setdefault(label(name), {})[2] = float(rate.mean())
     rising = sorted([*bounds, *strategies], key=lambda bound: (bound.attempts, bound.rate))
     return bounds_table(rising, category, rates)
+
+
+def _both_attempts(results: Path, category: str) -> dict[str, Vector]:
+    """Returns the success rate of two attempts in each environment, shape (E,), by estimator."""
+    path = results / "bounds" / category / "trials.parquet"
+    if not path.exists():
+        return {}
+    table = TrialTable(read_trials(path))
+    environments = np.array([environment for environment, _ in table.pairs()])
+    rates = {}
+    for name in set(LEARNED) & set(table.methods()):
+        won = table.success(name, 2)
+        rates[name] = np.array([won[environments == e].mean() for e in np.unique(environments)])
+    return rates
 
 
 def _first_model(name: str, category: str) -> SuccessModel:

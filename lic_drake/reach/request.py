@@ -279,20 +279,27 @@ def request_of(record: ReachRecord, scenario: Scenario) -> ReachRequest:
     )
 
 
-def check_goal(scenario: Scenario, p_WG: NDArray[np.float64]) -> None:
+def check_goal(scenario: Scenario, p_RG: NDArray[np.float64], torso_m: float | None = None) -> None:
     """Refuses goals that no reach could come to.
+
+    Args:
+        scenario: Robot and success distance.
+        p_RG: The goal as seen from the base, shape (3,), metres.
+        torso_m: Height of the torso, metres; by default as the scenario's task has it.
 
     Raises:
         RequestError: The goal is not finite or further away than the arm reaches.
     """
-    if p_WG.shape != (3,) or not np.all(np.isfinite(p_WG)):
-        raise RequestError(f"a goal is two finite numbers in metres, got {p_WG.tolist()}")
-    if not is_within_reach(scenario, p_WG):
-        distance = np.linalg.norm(p_WG - scenario.arm().p_RS)
+    if p_RG.shape != (3,) or not np.all(np.isfinite(p_RG)):
+        raise RequestError(f"a goal is two finite numbers in metres, got {p_RG.tolist()}")
+    if not is_within_reach(scenario, p_RG, torso_m):
+        arm = scenario.arm(torso_m)
+        distance = np.linalg.norm(p_RG - arm.p_RS)
+        shown = ", ".join(f"{x:g}" for x in (p_RG[:2] if arm.surface is None else p_RG))
         raise RequestError(
-            f"the goal ({p_WG[0]:g}, {p_WG[1]:g}) m is {distance:.3f} m from the base"
-            f" and the arm reaches {_farthest_goal_m(scenario.arm(), scenario):.3f} m; choose a"
-            " nearer goal"
+            f"the goal ({shown}) m is {distance:.3f} m from the"
+            f" {'base' if arm.surface is None else 'shoulder'} and the arm reaches"
+            f" {_farthest_goal_m(arm, scenario):.3f} m; choose a nearer goal"
         )
 
 
