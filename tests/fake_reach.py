@@ -11,7 +11,7 @@ from pathlib import Path
 
 from lic_drake.experience.grid import REQUEST_FILE, CollectionRequest, write_request
 from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.reach.request import ReachRecord, ReachRequest
+from lic_drake.reach.request import IN_PLANE, ReachRecord, ReachRequest
 from lic_drake.reach.scenario import load_scenario
 
 
@@ -35,7 +35,7 @@ def fill_library(path: Path) -> Path:
 def make_record(request: ReachRequest) -> ReachRecord:
     """A record whose numbers are drawn from the key; reaches from y = -0.3 m never began."""
     digest = hashlib.sha256(request.key.encode()).digest()
-    began = request.start[1] > -0.25
+    began = len(request.start) != IN_PLANE or request.start[1] > -0.25
     success = began and digest[0] % 2 == 1
     numbers = [int.from_bytes(digest[i : i + 4]) / 2**32 if began else math.nan for i in range(12)]
     return ReachRecord(
@@ -50,7 +50,7 @@ def make_record(request: ReachRequest) -> ReachRecord:
         goal_z=request.goal[2],
         start_x=request.start[0],
         start_y=request.start[1],
-        start_phi=request.start[2],
+        start_phi=request.start[2] if len(request.start) == IN_PLANE else 0.0,
         outcome="reached" if success else "stuck" if began else "invalid_start",
         success=success,
         final_x=numbers[0],
@@ -72,8 +72,20 @@ def make_record(request: ReachRequest) -> ReachRecord:
         drake_version="1.58.0",
         base_x=request.base[0],
         base_y=request.base[1],
-        after=tuple(x for earlier in request.after for x in (*earlier.start, *earlier.base)),
+        after=tuple(x for earlier in request.after for x in earlier.flat()),
+        torso=request.torso,
+        **_pose_in_space(request.start, numbers),
     )
+
+
+def _pose_in_space(start: tuple[float, ...], numbers: list[float]) -> dict[str, float]:
+    """Columns that poses in the plane do not have."""
+    if len(start) == IN_PLANE:
+        return {}
+    axes = ("z", "qw", "qx", "qy", "qz")
+    first = {f"start_{axis}": value for axis, value in zip(axes, start[2:], strict=True)}
+    last = {f"final_{axis}": value for axis, value in zip(axes, numbers[5:10], strict=True)}
+    return {**first, **last, "final_vz": numbers[11]}
 
 
 @dataclass(frozen=True, kw_only=True)

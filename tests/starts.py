@@ -7,8 +7,9 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.plant import MultibodyPlant
 
 from lic_drake.reach.hand_poses import HandPoses
+from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.reach.scenario import load_scenario
-from lic_drake.reach.starts import ApertureStarts, InitialConditions, LineStarts
+from lic_drake.reach.starts import ApertureStarts, LineStarts
 from lic_drake.reach.task import BaseTrack, StartLine
 from lic_drake.robots.planar import planar_arm
 

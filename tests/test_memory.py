@@ -27,7 +27,7 @@ from lic_drake.reach import environment as reach_environment
 from lic_drake.reach import recording, rollout, waking
 from lic_drake.reach.diagram import ReachDiagram, make_reach_diagram
 from lic_drake.reach.environment import Environment
-from lic_drake.reach.pointing_starts import find_pointing_starts
+from lic_drake.reach.pointing_starts import pointing_starts
 from lic_drake.reach.recording import ReachRecording
 from lic_drake.reach.request import make_request
 from lic_drake.reach.rollout import run_reach
@@ -103,7 +103,8 @@ def test_a_reach_in_contact_leaves_nothing(built: list["weakref.ref[Any]"]) -> N
 def test_reaches_of_the_pr2_leave_nothing(built: list["weakref.ref[Any]"]) -> None:
     scenario = load_scenario("sphere-aperture-clutter", "{stop: {timeout_s: 0.2}}")
     for environment in range(2):
-        starts = find_pointing_starts(scenario, scenario.sample_instance("training", environment))
+        instance = scenario.sample_instance("training", environment)
+        starts = pointing_starts(scenario, instance).grid
         p_WG = scenario.goals("training", environment)[4]
         run_reach(make_request(scenario, "training", environment, p_WG, starts.x0[7]))
     assert len(built) >= 2 * len(ONE_DIAGRAM)

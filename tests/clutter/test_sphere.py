@@ -13,7 +13,9 @@ from lic_drake.errors import ScenarioError
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.seeds import make_generator
 
-SHIPPED = SphereApertureClutter()
+SCENARIO = load_scenario("sphere-aperture-clutter")
+assert isinstance(SCENARIO.clutter, SphereApertureClutter)
+SHIPPED = SCENARIO.clutter
 
 
 def sample(clutter: SphereApertureClutter, index: int = 0) -> ClutterInstance:
@@ -28,8 +30,7 @@ def is_in_board(instance: ClutterInstance, p_WQ: np.ndarray) -> np.ndarray:
 
 
 def test_the_shipped_scenario_has_the_papers_numbers() -> None:
-    clutter = load_scenario("sphere-aperture-clutter").clutter
-    assert clutter == SHIPPED
+    assert SHIPPED == SphereApertureClutter()
     instance = sample(SHIPPED)
     assert np.count_nonzero(instance.movable) == 40
     np.testing.assert_array_equal(instance.size[instance.movable, 0], 0.05)
@@ -40,20 +41,19 @@ def test_the_shipped_scenario_has_the_papers_numbers() -> None:
 
 
 def test_goals_and_apertures_are_the_papers_grids() -> None:
-    scenario = load_scenario("sphere-aperture-clutter")
-    goals = scenario.goals("training", 0)
-    apertures = scenario.sample_instance("training", 0).p_WA
+    goals = SCENARIO.goals("training", 0)
+    apertures = SCENARIO.sample_instance("training", 0).p_WA
     assert apertures is not None
     for grid, extent, count in ((goals, [0.0, 0.6, 0.4], 12), (apertures, [0.0, 0.8, 0.6], 20)):
         assert len(grid) == count
         np.testing.assert_allclose(np.ptp(grid, axis=0), extent, atol=1e-12)
         assert pdist(grid).min() == pytest.approx(0.2)
         # One behind the other's middle.
-        np.testing.assert_allclose(grid.mean(axis=0)[1:], [-0.19, 0.94], atol=1e-12)
+        np.testing.assert_allclose(grid.mean(axis=0)[1:], [-0.29, 0.89], atol=1e-12)
     spheres = np.array(SHIPPED.upper)[0] + SHIPPED.radius_m
     assert goals[:, 0].min() > spheres
     for index in range(5):
-        goal = scenario.sample_goal("evaluation", 0, index)
+        goal = SCENARIO.sample_goal("evaluation", 0, index)
         assert np.all(goal >= goals.min(axis=0) - 1e-12)
         assert np.all(goal <= goals.max(axis=0) + 1e-12)
 
@@ -112,7 +112,7 @@ def test_what_is_blocked_is_random_and_leaves_the_spheres_as_they_are() -> None:
         ({"num_spheres": -1}, "num_spheres must be from 0"),
         ({"radius_m": 0.0}, "radius_m must be a positive number"),
         ({"lower": [0.0, 0.0]}, r"lower must be \[x, y, z\]"),
-        ({"upper": [0.77, 0.16, 0.74]}, "must be below upper"),
+        ({"upper": [0.78, 0.06, 0.69]}, "must be below upper"),
         ({"rows": 0}, "rows must be from 1 to 20"),
         ({"bar_m": 0.2}, "leave nothing of apertures"),
         ({"num_blocked": 20}, "must leave one of 20 apertures open"),
@@ -122,6 +122,28 @@ def test_what_is_blocked_is_random_and_leaves_the_spheres_as_they_are() -> None:
 def test_values_that_make_no_sense_are_refused(values: dict[str, Any], message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
         replace(SHIPPED, **values)
+
+
+@pytest.mark.parametrize("num_blocked", [0, 7])
+def test_a_bare_board_is_what_all_environments_have_but_for_spheres_and_blocks(
+    num_blocked: int,
+) -> None:
+    clutter = replace(SHIPPED, num_blocked=num_blocked)
+    bare = clutter.bare_board()
+    assert not bare.movable.any()
+    np.testing.assert_array_equal(bare.p_WA, clutter.aperture_centres())
+    open_board = sample(replace(SHIPPED, num_spheres=0))
+    np.testing.assert_array_equal(bare.p_WO, open_board.p_WO)
+    np.testing.assert_array_equal(bare.size, open_board.size)
+    # Blocks only add to it.
+    drawn = {(*p_WO, *size) for p_WO, size in zip(*_boxes(sample(clutter)), strict=True)}
+    known = {(*p_WO, *size) for p_WO, size in zip(*_boxes(bare), strict=True)}
+    assert known <= drawn
+    assert len(drawn) == len(known) + num_blocked
+
+
+def _boxes(instance: ClutterInstance) -> tuple[np.ndarray, np.ndarray]:
+    return instance.p_WO[~instance.movable], instance.size[~instance.movable]
 
 
 def test_too_many_spheres_do_not_fit() -> None:

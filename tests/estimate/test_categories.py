@@ -3,7 +3,7 @@ import pytest
 from lic_drake.estimate import categories
 from lic_drake.estimate.categories import features_of, register_category
 from lic_drake.estimate.checks import EstimateError
-from lic_drake.estimate.features import PLANAR_LIC1
+from lic_drake.estimate.features import PLANAR_LIC1, SPACE_LIC1
 
 NAMES = ("cylinder-clutter", "passage-clutter", "cylinder-aperture-clutter")
 
@@ -27,6 +27,13 @@ def test_observations_are_the_paper_s() -> None:
         "passage-clutter": {"first_final_vx", "first_final_vy"},
         "cylinder-aperture-clutter": set(),
     }
+
+
+def test_in_space_the_first_start_is_its_place_across_x() -> None:
+    features = features_of("sphere-aperture-clutter")
+    assert features.first == SPACE_LIC1
+    assert (features.second.goal, features.second.start) == (SPACE_LIC1.goal, SPACE_LIC1.start)
+    assert set(features.second.observed) == {"first_start_y", "first_start_z"}
 
 
 def test_a_category_can_be_added_by_one_call(monkeypatch: pytest.MonkeyPatch) -> None:

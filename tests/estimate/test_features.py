@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from lic_drake.estimate.checks import EstimateError
-from lic_drake.estimate.features import PLANAR_LIC1, FeatureMap
+from lic_drake.estimate.features import PLANAR_LIC1, SPACE_LIC1, FeatureMap
 from lic_drake.experience.second_reach import SHOWN
 
 
@@ -124,11 +124,11 @@ def test_a_situation_moved_with_its_base_has_the_same_features(pairs) -> None:
 
 
 def test_joining_with_an_observation_gives_the_row_of_the_pair(pairs) -> None:
-    base = np.array([pairs["base_x"][0], pairs["base_y"][0]])
+    b0 = np.array([pairs["base_x"][0], pairs["base_y"][0], 0.0])
     first = {name: pairs[f"first_{name}"][0] for name in SHOWN}
-    observed = SECOND.observation(first, base)
-    p_RG = np.array([pairs[f"goal_{axis}"][0] for axis in "xyz"]) - [*base, 0.0]
-    x0 = np.array([pairs[f"start_{name}"][0] for name in ("x", "y", "phi")]) - [*base, 0.0]
+    observed = SECOND.observation(first, b0)
+    p_RG = np.array([pairs[f"goal_{axis}"][0] for axis in "xyz"]) - b0
+    x0 = np.array([pairs[f"start_{name}"][0] for name in ("x", "y", "phi")]) - b0
     np.testing.assert_allclose(SECOND.join(p_RG, x0, observed), SECOND.rows(pairs).Z[0])
     many = SECOND.join(p_RG, np.tile(x0, (4, 2, 1)), observed)
     assert many.shape == (4, 2, 12)
@@ -138,16 +138,18 @@ def test_joining_with_an_observation_gives_the_row_of_the_pair(pairs) -> None:
 def test_the_gradient_by_the_base_is_the_derivative_with_the_world_standing_still() -> None:
     rng = np.random.default_rng(0)
     weight = rng.normal(size=len(SECOND.names))
-    p_WG, x0, base = rng.normal(size=3), rng.normal(size=3), rng.normal(size=2)
+    p_WG, x0, base = rng.normal(size=3), rng.normal(size=3), np.append(rng.normal(size=2), 0.0)
     first = dict(zip(SHOWN, rng.normal(size=len(SHOWN)), strict=True))
 
     def value(b0):
-        shift = [*b0, 0.0]
-        return weight @ SECOND.join(p_WG - shift, x0 - shift, SECOND.observation(first, b0))
+        return weight @ SECOND.join(p_WG - b0, x0 - b0, SECOND.observation(first, b0))
 
-    numeric = [(value(base + step) - value(base - step)) / 2e-3 for step in 1e-3 * np.eye(2)]
-    np.testing.assert_allclose(SECOND.gradient_by_base(weight), numeric, atol=1e-9)
-    np.testing.assert_array_equal(PLANAR_LIC1.gradient_by_base(np.arange(1.0, 5.0)), [-1.0, -5.0])
+    numeric = [(value(base + step) - value(base - step)) / 2e-3 for step in 1e-3 * np.eye(2, 3)]
+    # No torso carries a robot in the plane.
+    np.testing.assert_allclose(SECOND.gradient_by_base(weight), [*numeric, 0.0], atol=1e-9)
+    np.testing.assert_array_equal(
+        PLANAR_LIC1.gradient_by_base(np.arange(1.0, 5.0)), [-1.0, -5.0, 0.0]
+    )
 
 
 def test_a_first_reach_that_never_began_shows_nothing() -> None:
@@ -166,3 +168,79 @@ def test_joining_without_the_observation_is_refused(observed) -> None:
 def test_observed_features_are_columns_of_the_first_reach() -> None:
     with pytest.raises(EstimateError, match="observed features must be some of first_start_x"):
         FeatureMap(goal=("goal_x",), start=("start_y",), observed=("final_x",))
+
+
+# In space
+
+
+IN_SPACE = FeatureMap(
+    goal=("goal_x", "goal_y", "goal_z"),
+    observed=("first_start_z", "first_start_qx", "first_final_z", "first_final_vz"),
+    start=("start_x", "start_y", "start_z", "start_qw", "start_qx", "start_qy", "start_qz"),
+)
+POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
+
+
+@pytest.fixture
+def pairs_in_space(pairs) -> dict[str, np.ndarray]:
+    rng = np.random.default_rng(4)
+    return (
+        pairs
+        | {f"start_{name}": rng.normal(size=2) for name in POSE}
+        | {
+            "goal_z": np.array([0.9, 1.1]),
+            "torso": np.array([0.2, 0.05]),
+        }
+    )
+
+
+def test_heights_are_told_from_the_torso_and_rotations_and_velocities_are_not(
+    pairs_in_space,
+) -> None:
+    moved = IN_SPACE.rows(pairs_in_space).Z
+    for name in ("base_x", "base_y", "torso"):
+        del pairs_in_space[name]
+    difference = IN_SPACE.rows(pairs_in_space).Z - moved
+    b0 = {"x": [0.25, 0.0], "y": [-0.5, 1.0], "z": [0.2, 0.05]}
+    for name, column in zip(IN_SPACE.names, difference.T, strict=True):
+        expected = b0.get(name.rsplit("_", 1)[1], [0.0, 0.0])
+        np.testing.assert_allclose(column, expected, atol=1e-12, err_msg=name)
+
+
+def test_joining_in_space_gives_the_row_of_the_pair(pairs_in_space) -> None:
+    row = {name: values[0] for name, values in pairs_in_space.items()}
+    b0 = np.array([row["base_x"], row["base_y"], row["torso"]])
+    observed = IN_SPACE.observation({name: row[f"first_{name}"] for name in SHOWN}, b0)
+    p_RG = np.array([row[f"goal_{axis}"] for axis in "xyz"]) - b0
+    x0 = np.array([row[f"start_{name}"] for name in POSE]) - np.append(b0, np.zeros(4))
+    expected = IN_SPACE.rows(pairs_in_space).Z[0]
+    np.testing.assert_allclose(IN_SPACE.join(p_RG, x0, observed), expected)
+    few = SPACE_LIC1.join(p_RG, np.tile(x0, (3, 1)))
+    np.testing.assert_allclose(few, np.tile([*p_RG[1:], *x0[[1, 2, 4]]], (3, 1)))
+
+
+def test_the_gradients_in_space_are_the_derivatives_through_join() -> None:
+    rng = np.random.default_rng(1)
+    first = dict(zip(SHOWN, rng.normal(size=len(SHOWN)), strict=True))
+    p_WG, x0, b0 = rng.normal(size=3), rng.normal(size=7), rng.normal(size=3)
+    for features in (IN_SPACE, SPACE_LIC1):
+        weight = rng.normal(size=len(features.names))
+
+        def value(x0, b0, features=features, weight=weight):
+            x0_R = x0 - np.append(b0, np.zeros(4))
+            return weight @ features.join(p_WG - b0, x0_R, features.observation(first, b0))
+
+        by_x0 = [(value(x0 + e, b0) - value(x0 - e, b0)) / 2e-3 for e in 1e-3 * np.eye(7)]
+        by_b0 = [(value(x0, b0 + e) - value(x0, b0 - e)) / 2e-3 for e in 1e-3 * np.eye(3)]
+        np.testing.assert_allclose(features.gradient_by_x0(weight), by_x0, atol=1e-9)
+        np.testing.assert_allclose(features.gradient_by_base(weight), by_b0, atol=1e-9)
+
+
+def test_features_know_whether_they_are_of_space() -> None:
+    assert IN_SPACE.in_space and SPACE_LIC1.in_space
+    assert not PLANAR_LIC1.in_space and not SECOND.in_space
+
+
+def test_a_start_of_both_plane_and_space_is_refused() -> None:
+    with pytest.raises(EstimateError, match="start features are of the plane or of space, got"):
+        FeatureMap(goal=("goal_x",), start=("start_z", "start_phi"))

@@ -4,8 +4,8 @@ from select_surfaces import random_model
 from starts import APERTURES, ARM, LINE
 
 from lic_drake.evaluate.density import DENSITY_SHAPE, density_lattice, estimate_density
-from lic_drake.reach.starts import Starts
-from lic_drake.select.lic import LicSelector
+from lic_drake.reach.starts import ApertureStarts, LineStarts
+from lic_drake.select.planar_lic import PlanarLic
 from lic_drake.select.situation import Situation
 
 GOAL = np.array([0.6, 0.1, 0.0])
@@ -13,7 +13,7 @@ GOAL = np.array([0.6, 0.1, 0.0])
 
 @pytest.mark.parametrize("starts", [LINE, APERTURES], ids=["line", "apertures"])
 def test_a_density_covers_the_line_relative_to_the_base_in_every_region(
-    starts: Starts,
+    starts: LineStarts | ApertureStarts,
 ) -> None:
     line = starts.poses.line
     for region in starts.regions:
@@ -33,14 +33,16 @@ def test_a_density_covers_the_line_relative_to_the_base_in_every_region(
 
 
 @pytest.mark.parametrize("starts", [LINE, APERTURES], ids=["line", "apertures"])
-def test_estimates_are_the_models_where_the_arm_can_start(starts: Starts) -> None:
+def test_estimates_are_the_models_where_the_arm_can_start(
+    starts: LineStarts | ApertureStarts,
+) -> None:
     model = random_model(3)
-    selector = LicSelector(ARM, model)
+    selector = PlanarLic(ARM, model)
     conditions, _ = density_lattice(starts, starts.regions[0])
-    some = conditions.take(np.arange(0, len(conditions.x0), 97))
+    some = conditions.take(np.arange(0, len(conditions), 97))
     density = estimate_density(selector, Situation(p_WG=GOAL, starts=starts), some)
     possible = 0
-    for x0, p_WR, value in zip(*some, density, strict=True):
+    for x0, p_WR, value in zip(some.x0, some.p_WR, density, strict=True):
         if ARM.solve_ik(x0 - [*p_WR, 0.0]) is None:
             assert np.isnan(value)
             continue

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from fake_reach import make_record
 
-from lic_drake.errors import RequestError
-from lic_drake.evaluate.trial import planar_arm_of, run_trial
+from lic_drake.evaluate.trial import run_trial
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.scenario import Scenario, load_scenario
 from lic_drake.select.baselines import RandomSelector
@@ -92,17 +91,3 @@ def test_a_strategy_knows_what_the_failed_attempts_showed(scenario: Scenario) ->
         np.testing.assert_array_equal(failed.p_WR, attempt.selection.p_WR)
         np.testing.assert_array_equal(failed.shown["final_x"], attempt.record.final_x)
         np.testing.assert_array_equal(failed.shown["final_vy"], attempt.record.final_vy)
-
-
-def test_selection_knows_the_planar_arm_only() -> None:
-    scenario = load_scenario("cylinder-clutter")
-
-    class Other:
-        robot = "other"
-
-        def arm(self) -> object:
-            return object()
-
-    assert planar_arm_of(scenario) is scenario.arm()
-    with pytest.raises(RequestError, match="selection knows the planar arm only, not 'other'"):
-        planar_arm_of(Other())  # type: ignore[arg-type]

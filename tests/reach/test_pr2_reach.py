@@ -15,7 +15,7 @@ from lic_drake.experience.grid import CollectionRequest
 from lic_drake.reach import rollout
 from lic_drake.reach.diagram import make_reach_diagram
 from lic_drake.reach.environment import Environment, simulate
-from lic_drake.reach.pointing_starts import find_pointing_starts
+from lic_drake.reach.pointing_starts import pointing_starts, standing_at
 from lic_drake.reach.recording import ReachRecording
 from lic_drake.reach.request import make_request, request_of
 from lic_drake.reach.rollout import run_reach
@@ -92,22 +92,22 @@ def test_the_torso_lifts_the_arm_and_has_its_range() -> None:
 
 def test_a_reach_into_forty_spheres_gives_the_same_record_again() -> None:
     instance = BRIEF.sample_instance("training", 1)
-    start = find_pointing_starts(BRIEF, instance, np.array([0.01, 0.02]), 0.16)
+    start = pointing_starts(BRIEF, instance, standing_at(0.02, 0.16))
+    # Base and tool 1 cm nearer to the spheres than starts are: a request may be of any base.
+    p_WR, x0 = np.array([0.01, 0.02]), start.grid.x0[8] + np.eye(7)[0] * 0.01
     p_WG = BRIEF.goals("training", 1)[6]
-    request = make_request(BRIEF, "training", 1, p_WG, start.x0[8], start.p_WR, start.torso_m)
+    request = make_request(BRIEF, "training", 1, p_WG, x0, p_WR, 0.16)
     record = run_reach(request)
     assert record.outcome == "timeout"
     assert record.robot == "pr2"
     assert (record.base_x, record.base_y, record.torso) == (0.01, 0.02, 0.16)
     assert record.in_space
-    np.testing.assert_array_equal(record.x0, start.x0[8])
-    np.testing.assert_allclose(record.q_start, start.q[8], atol=1e-6)
-    final = pr2_of(BRIEF).raised(0.16).tip_pose(np.array(record.q_final)) + np.pad(
-        start.p_WR, (0, 5)
-    )
+    np.testing.assert_array_equal(record.x0, x0)
+    np.testing.assert_allclose(record.q_start, start.grid_angles[8], atol=1e-6)
+    final = pr2_of(BRIEF).raised(0.16).tip_pose(np.array(record.q_final)) + np.pad(p_WR, (0, 5))
     names = ("x", "y", "z", "qw", "qx", "qy", "qz")
     np.testing.assert_allclose([getattr(record, f"final_{n}") for n in names], final, atol=1e-12)
-    assert record.min_distance < np.linalg.norm(p_WG - start.x0[8, :3])
+    assert record.min_distance < np.linalg.norm(p_WG - x0[:3])
     assert request_of(record, BRIEF) == request
     assert request_of(record, BRIEF).key == record.key
     rollout._environments.clear()
@@ -124,18 +124,34 @@ def test_a_start_of_the_wrong_kind_is_refused() -> None:
 
 
 def test_a_collection_holds_every_goal_from_every_start() -> None:
-    requests = CollectionRequest(scenario=BRIEF, environments=1).reaches(0)
-    assert len({request.key for request in requests}) == 12 * 19
-    assert {request.torso for request in requests} == {0.15}
+    # From (y 0.075 m, torso 0.2 m), where environment 7 has them, the arm cannot take one start.
+    for environment, count, y_m, torso_m in ((0, 20, -0.075, 0.1), (7, 19, 0.075, 0.2)):
+        collection = CollectionRequest(
+            scenario=BRIEF, environments=1, first_environment=environment
+        )
+        requests = collection.reaches(environment)
+        assert len({request.key for request in requests}) == len(requests) == 12 * count
+        assert {request.base for request in requests} == {(0.0, y_m)}
+        assert {request.torso for request in requests} == {torso_m}
+        assert len({request.goal for request in requests}) == 12
+        assert len({request.start[:3] for request in requests}) == count
+
+
+def test_a_collections_reaches_are_counted_where_starts_differ_from_place_to_place() -> None:
+    collection = CollectionRequest(scenario=BRIEF, environments=8)
+    assert collection.num_reaches(range(8)) == 12 * (7 * 20 + 19)
+    assert collection.num_reaches([7]) == len(collection.reaches(7))
+    assert collection.num_reaches([]) == 0
 
 
 def test_a_recording_shows_the_robot(tmp_path: Path) -> None:
     short = load_scenario("sphere-aperture-clutter", "{stop: {timeout_s: 0.08}}")
     instance = short.sample_instance("training", 0)
-    p_WG, start = short.goals("training", 0)[4], find_pointing_starts(short, instance, None, 0.16)
+    p_WG = short.goals("training", 0)[4]
+    start = pointing_starts(short, instance, standing_at(0.01, 0.16)).grid
     environment = Environment(short, instance, p_WR=np.array([0.0, 0.01, 0.0]), torso_m=0.16)
-    result = environment.reach(p_WG, start.x0[7] + np.pad([0.0, 0.01], (0, 5)), keep_states=True)
-    assert result.outcome in ("timeout", "invalid_start")
+    result = environment.reach(p_WG, start.x0[7], keep_states=True)
+    assert result.outcome == "timeout"
     recording = ReachRecording(short, instance, 0.16)
     recording.add_reach(result.trace, p_WG)
     recording.save(tmp_path / "pr2.html")
@@ -147,7 +163,7 @@ def test_a_recording_shows_the_robot(tmp_path: Path) -> None:
 
 def test_a_further_reach_finds_the_spheres_where_the_first_left_them() -> None:
     p_WG = BRIEF.goals("training", 2)[4]
-    starts = find_pointing_starts(BRIEF, BRIEF.sample_instance("training", 2))
+    starts = pointing_starts(BRIEF, BRIEF.sample_instance("training", 2)).grid
     first = make_request(BRIEF, "training", 2, p_WG, starts.x0[7])
     second = first.then(starts.x0[8], np.zeros(2), torso_m=0.16)
     assert (second.torso, second.after[0].torso) == (0.16, 0.15)

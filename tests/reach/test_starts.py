@@ -30,13 +30,16 @@ BARE = load_scenario(
 
 
 def angles_of(conditions: InitialConditions) -> list[np.ndarray]:
-    q = [ARM.solve_ik(x0 - [*p_WR, 0.0]) for x0, p_WR in zip(*conditions, strict=True)]
+    q = [
+        ARM.solve_ik(x0 - [*p_WR, 0.0])
+        for x0, p_WR in zip(conditions.x0, conditions.p_WR, strict=True)
+    ]
     assert all(item is not None for item in q)
     return q
 
 
 def assert_all_possible(starts: LineStarts | ApertureStarts, conditions: InitialConditions) -> None:
-    for x0, p_WR, q in zip(*conditions, angles_of(conditions), strict=True):
+    for x0, p_WR, q in zip(conditions.x0, conditions.p_WR, angles_of(conditions), strict=True):
         assert_possible(starts, x0, p_WR, q)
         assert is_possible(starts, x0, p_WR)
         region = find_region(starts.regions, x0, p_WR)
@@ -101,7 +104,7 @@ def test_grid_and_lattice_have_every_pose_at_every_aperture_that_the_track_allow
         }
         found = [
             (round(x0[1], 9), round(p_WR[1], 9), round(x0[2], 9))
-            for x0, p_WR in zip(*conditions, strict=True)
+            for x0, p_WR in zip(conditions.x0, conditions.p_WR, strict=True)
         ]
         assert len(found) == len(expected)
         assert set(found) == expected
@@ -122,7 +125,7 @@ def test_the_arm_keeps_clear_of_the_barrier_at_every_start() -> None:
         tried = starts.grid.join(training_starts(BARE, "training", environment))
         tried = tried.join(starts.lattice.take(np.arange(0, len(starts.lattice.x0), 7)))
         front = BARE.clutter.barrier_x_m - 0.5 * BARE.clutter.barrier_thickness_m
-        for (x0, p_WR), q in zip(zip(*tried, strict=True), angles_of(tried), strict=True):
+        for x0, p_WR, q in zip(tried.x0, tried.p_WR, angles_of(tried), strict=True):
             assert gap_to_boxes(q, instance.translated(-np.append(p_WR, 0.0))) > 0.005
             # Joints and hand are behind the barrier or, the hand, in the middle of its opening.
             x = ARM.kinematics.link_origins(q)[:, 0] + p_WR[0]

@@ -118,6 +118,64 @@ def test_a_stuck_window_shorter_than_a_step_still_spans_one() -> None:
     assert ending(lambda t: 0.06 * t, config=short)[0] == "timeout"
 
 
+# Progress towards the goal
+
+SLOW = replace(RULES, progress_m=0.01, progress_time_s=2.0)
+
+
+def test_a_goal_that_comes_nearer_too_slowly_is_not_waited_for() -> None:
+    # In 2 s: 8 mm and 12 mm. Both move more than the 2 mm in 4 s of the other rule.
+    assert ending(lambda t: 0.004 * t, config=SLOW) == ("stuck", 50)
+    assert ending(lambda t: 0.006 * t, config=SLOW) == ("timeout", 750)
+
+
+def test_a_motion_that_comes_no_nearer_than_before_makes_no_progress() -> None:
+    def to_and_fro(t: float) -> float:
+        """5 cm to and fro every 2 s, nearest at 0.5 s; the samples beside it are 4 um further."""
+        return 0.05 * np.sin(np.pi * t)
+
+    # At 2.32 s the window begins at 0.32 s, 7.8 mm behind the nearest; at 0.28 s it was 11.5 mm.
+    moving = replace(RULES, stuck_time_s=np.inf)
+    slow = replace(SLOW, stuck_time_s=np.inf)
+    assert ending(to_and_fro, config=slow) == ("stuck", 58)
+    assert ending(to_and_fro, config=moving) == ("timeout", 750)
+    assert ending(lambda t: -0.05 * t, config=SLOW) == ("stuck", 50)
+    assert ending(lambda t: -0.05 * t, config=RULES) == ("timeout", 750)
+
+
+def test_two_seconds_count_from_the_last_progress() -> None:
+    # 0.06 m/s for 3 s, 2.4 mm a sample: sample 75 is the last that is nearer, and sample 71, 50
+    # samples before the end, the first that is less than 10 mm behind it.
+    assert ending(lambda t: 0.06 * min(t, 3.0), config=SLOW) == ("stuck", 121)
+
+
+def test_a_way_back_that_is_made_good_is_progress_only_beyond_the_nearest() -> None:
+    def detour(t: float) -> float:
+        """0.1 m ahead in 1 s, back by 0.05 m within 0.5 s, and ahead again at 0.1 m/s."""
+        if t <= 1.0:
+            return 0.1 * t
+        return 0.1 - 0.1 * (t - 1.0) if t <= 1.5 else 0.05 + 0.1 * (t - 1.5)
+
+    # At 0.1 m again after 2 s, at 0.11 m after 2.1 s: one second without progress.
+    long = replace(SLOW, progress_time_s=1.2)
+    assert ending(detour, config=long)[0] == "timeout"
+    short = replace(SLOW, progress_time_s=0.8)
+    assert ending(detour, config=short) == ("stuck", 43)
+
+
+def test_no_progress_wanted_switches_the_rule_off() -> None:
+    off = replace(SLOW, progress_m=0.0)
+    assert ending(lambda t: -0.05 * t, config=off) == ("timeout", 750)
+    assert ending(still, config=off) == ("stuck", 100)
+    assert StopConfig().progress_m == 0.0
+
+
+@pytest.mark.parametrize("progress_time_s", [30.04, 1e300, np.inf])
+def test_a_progress_time_over_the_timeout_switches_the_rule_off(progress_time_s: float) -> None:
+    config = replace(SLOW, progress_time_s=progress_time_s)
+    assert ending(lambda t: -0.05 * t, config=config) == ("timeout", 750)
+
+
 @pytest.mark.parametrize("stuck_time_s", [30.04, 1e6, 1e300, np.inf])
 def test_a_stuck_time_over_the_timeout_switches_the_rule_off(stuck_time_s: float) -> None:
     assert ending(still, config=replace(RULES, stuck_time_s=stuck_time_s)) == ("timeout", 750)
@@ -139,14 +197,23 @@ def test_the_smallest_distance_is_kept() -> None:
     st.integers(1, 20),
     st.integers(1, 70),
     st.floats(-0.02, 0.02),
+    st.sampled_from([0.0, 0.0007, 0.002]),
+    st.integers(1, 20),
 )
 def test_the_first_rule_that_holds_over_the_whole_motion_ends_it(
-    samples: list[tuple[float, float]], window: int, last: int, goal: float
+    samples: list[tuple[float, float]],
+    window: int,
+    last: int,
+    goal: float,
+    progress: float,
+    slow: int,
 ) -> None:
     config = StopConfig(
         success_distance_m=0.004,
         stuck_distance_m=0.0005,
         stuck_time_s=window * PERIOD_S,
+        progress_m=progress,
+        progress_time_s=slow * PERIOD_S,
         timeout_s=last * PERIOD_S,
         force_limit_N=50.0,
         force_time_s=1.5 * PERIOD_S,
@@ -155,11 +222,13 @@ def test_the_first_rule_that_holds_over_the_whole_motion_ends_it(
     force = np.array([value for _, value in samples])
     k = np.arange(len(x))
     back = np.where(k >= window, np.abs(x - x[np.maximum(k - window, 0)]), np.inf)
+    nearest = np.minimum.accumulate(np.abs(x - goal))
+    gained = np.where(k >= slow, nearest[np.maximum(k - slow, 0)] - nearest, np.inf)
     holds = {
         "reached": np.abs(x - goal) < 0.004,
         # Two samples in a row; there is nothing before the first.
         "force": (force > 50.0) & (np.roll(force, 1) > 50.0) & (k > 1),
-        "stuck": back < 0.0005,
+        "stuck": (back < 0.0005) | (gained < progress),
         "timeout": k >= last,
     }
     ends = np.flatnonzero(np.any(list(holds.values()), axis=0))
@@ -177,11 +246,21 @@ def test_the_first_rule_that_holds_over_the_whole_motion_ends_it(
     assert monitor.min_distance == pytest.approx(np.abs(x[: i + 1] - goal).min(), abs=1e-12)
 
 
-@pytest.mark.parametrize("name", list(vars(StopConfig())))
+POSITIVE = [name for name in vars(StopConfig()) if name != "progress_m"]
+
+
+@pytest.mark.parametrize("name", POSITIVE)
 @pytest.mark.parametrize("value", [0.0, -1.0, float("nan")])
 def test_limits_must_be_positive(name: str, value: float) -> None:
     with pytest.raises(ScenarioError, match=f"stop rule {name} must be positive, got {value}"):
         StopConfig(**{name: value})
+
+
+@pytest.mark.parametrize("value", [-0.001, float("nan"), float("inf")])
+def test_progress_must_be_a_number_and_not_negative(value: float) -> None:
+    with pytest.raises(ScenarioError, match=f"progress_m must be 0 or more, got {value}"):
+        StopConfig(progress_m=value)
+    assert StopConfig(progress_m=0.0).progress_m == 0.0
 
 
 def test_reaches_of_more_than_an_hour_are_refused() -> None:

@@ -5,8 +5,9 @@ from hypothesis import strategies as st
 
 from lic_drake.errors import ScenarioError
 from lic_drake.reach.scenario import load_scenario
-from lic_drake.reach.task import GoalArea, StartLine
+from lic_drake.reach.task import GoalArea, Stand, StartLine
 from lic_drake.robots.planar import planar_arm
+from lic_drake.robots.pr2 import TORSO_RANGE_M
 
 ARM = planar_arm()
 TASK = load_scenario("cylinder-clutter").task
@@ -113,3 +114,51 @@ def test_an_area_without_extent_is_a_single_goal() -> None:
     area = GoalArea(lower=[0.6, 0.1], upper=[0.6, 0.1])
     np.testing.assert_array_equal(area.grid(), [[0.6, 0.1, 0.0]])
     np.testing.assert_array_equal(area.sample(np.random.default_rng(0)), [0.6, 0.1, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"y_min_m": 0.1}, r"stand y_m: needs .* got 0.1..0.0"),
+        ({"y_max_m": np.inf}, "stand y_m: needs finite numbers"),
+        ({"torso_min_m": 0.2}, r"stand torso_m: needs .* got 0.2..0.15"),
+        ({"torso_max_m": np.nan}, "stand torso_m: needs finite numbers"),
+        ({"training_y_m": []}, r"training_y_m must be .* from 0.0 to 0.0, one at least, got \[\]"),
+        ({"training_y_m": [0.0, 0.2]}, r"training_y_m must be .* got \[0.0, 0.2\]"),
+        ({"training_y_m": [np.nan]}, "training_y_m must be numbers from 0.0 to 0.0"),
+        ({"training_torso_m": []}, "training_torso_m must be numbers from 0.15 to 0.15"),
+        ({"training_torso_m": [0.1]}, r"training_torso_m must be .* got \[0.1\]"),
+    ],
+)
+def test_impossible_stands_are_refused(values: dict[str, object], message: str) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        Stand(**values)
+
+
+@given(st.integers(1, 5), st.integers(1, 4), st.integers(0, 200))
+def test_environments_of_a_library_have_all_places_with_all_heights_in_turn(
+    places: int, heights: int, first: int
+) -> None:
+    stand = Stand(
+        y_min_m=-1.0,
+        y_max_m=1.0,
+        torso_min_m=0.0,
+        torso_max_m=0.3,
+        training_y_m=np.linspace(-1.0, 1.0, places).tolist(),
+        training_torso_m=np.linspace(0.0, 0.3, heights).tolist(),
+    )
+    every = [(y, torso) for torso in stand.training_torso_m for y in stand.training_y_m]
+    # Wherever a library begins, as many environments as there are pairs have each of them once.
+    found = [stand.for_training(first + i) for i in range(len(every))]
+    assert sorted(found) == sorted(every)
+    assert [stand.for_training(i) for i in range(2 * len(every))] == 2 * every
+
+
+def test_the_shipped_stand_is_the_robots_range_and_has_its_libraries_places_inside() -> None:
+    stand = load_scenario("sphere-aperture-clutter").task.stand
+    assert stand is not None
+    assert (stand.torso_min_m, stand.torso_max_m) == TORSO_RANGE_M
+    assert {stand.for_training(i) for i in range(40)} == {
+        (y, torso) for y in (-0.075, -0.025, 0.025, 0.075) for torso in (0.1, 0.2)
+    }
+    assert load_scenario("cylinder-clutter").task.stand is None

@@ -178,7 +178,7 @@ def test_the_robot_can_be_added_to_a_frame_that_is_not_the_worlds() -> None:
 
 def test_a_mobile_robot_stands_where_a_welded_one_does_and_can_move() -> None:
     plant = MultibodyPlant(time_step=1e-3)
-    pr2 = ARM.add_to_plant(plant, mobile=True)
+    pr2 = Pr2Arm(*STAND, mobile=True).add_to_plant(plant)
     plant.Finalize()
     context = plant.CreateDefaultContext()
     assert plant.num_positions(pr2) == 11

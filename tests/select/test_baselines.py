@@ -2,11 +2,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pydrake.math import RollPitchYaw, RotationMatrix
 from scipy.stats import chisquare
 from starts import APERTURES, LINE
 
 from lic_drake.errors import RequestError
-from lic_drake.reach.starts import Starts
+from lic_drake.reach.initial_conditions import InitialConditions
+from lic_drake.reach.starts import ApertureStarts, LineStarts
 from lic_drake.select.baselines import (
     CostSelector,
     RandomSelector,
@@ -44,6 +46,74 @@ def test_cost_grows_with_distance_and_with_the_angle_to_the_goal(
     assert cost(0.2, angle + 0.05) > cost(0.2, angle)
 
 
+# What a PR2's hand of radius 0.06 m and length 0.18 m and a sphere of 0.05 m sweep.
+R, LENGTH = 0.06 + 0.05, 0.18
+
+
+def in_space(place: list[float], *turns: RollPitchYaw) -> np.ndarray:
+    """A start pose, shape (1, 7): the hand along Wx, and then turned in W, one after another."""
+    R_WE = RotationMatrix()
+    for turn in turns:
+        R_WE = RotationMatrix(turn) @ R_WE
+    return np.array([[*place, *R_WE.ToQuaternion().wxyz()]])
+
+
+def turned(roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0) -> RollPitchYaw:
+    return RollPitchYaw(roll, pitch, yaw)
+
+
+@pytest.mark.parametrize("roll", [0.0, 0.7, -3.0])
+def test_in_space_a_hand_that_points_at_the_goal_sweeps_a_cylinder(roll: float) -> None:
+    x0 = in_space([0.5, -0.2, 0.9], turned(roll=roll))
+    assert corridor_cost(x0, np.array([0.8, -0.2, 0.9]))[0] == pytest.approx(0.3 * np.pi * R**2)
+
+
+@pytest.mark.parametrize("angle", [0.1, 0.6, np.pi / 2])
+@pytest.mark.parametrize("roll", [0.0, 0.4, 2.0])
+def test_in_space_a_hand_at_an_angle_to_the_way_sweeps_its_length_too(
+    angle: float, roll: float
+) -> None:
+    # Turned aside by the angle, to the left and then up or down by a roll of all about Wx.
+    x0 = in_space([0.5, -0.2, 0.9], turned(yaw=angle), turned(roll=roll))
+    expected = 0.3 * (np.pi * R**2 + 2.0 * R * LENGTH * np.sin(angle))
+    assert corridor_cost(x0, np.array([0.8, -0.2, 0.9]))[0] == pytest.approx(expected)
+
+
+def test_in_space_a_hand_that_points_away_sweeps_its_whole_length() -> None:
+    x0 = in_space([0.5, -0.2, 0.9], turned(yaw=2.5))
+    expected = 0.3 * (np.pi * R**2 + 2.0 * R * LENGTH)
+    assert corridor_cost(x0, np.array([0.8, -0.2, 0.9]))[0] == pytest.approx(expected)
+
+
+@given(
+    st.floats(-np.pi, np.pi),
+    st.tuples(st.floats(-1.0, 1.0), st.floats(-1.5, 1.5), st.floats(-2.0, 2.0)),
+    st.tuples(st.floats(0.05, 0.5), st.floats(-0.4, 0.4), st.floats(-0.4, 0.4)),
+)
+def test_in_space_the_cost_is_the_same_after_a_turn_of_all_about_x(
+    angle: float, hand: tuple[float, float, float], way: tuple[float, float, float]
+) -> None:
+    place, p_WG = np.array([0.5, -0.2, 0.9]), np.array([0.5, -0.2, 0.9]) + way
+    turn = RotationMatrix(turned(roll=angle)).matrix()
+    before = in_space(place.tolist(), turned(*hand))
+    after = in_space((turn @ place).tolist(), turned(*hand), turned(roll=angle))
+    assert corridor_cost(after, turn @ p_WG)[0] == pytest.approx(
+        corridor_cost(before, p_WG)[0], rel=1e-6
+    )
+
+
+def test_in_the_horizontal_plane_space_and_plane_agree_on_the_angle() -> None:
+    # Both grow with the hand's length times the sine; only the radii and lengths differ.
+    phi = np.linspace(-2.0, 2.0, 21)
+    goal = np.array([0.6, 0.1, 0.0])
+    flat = np.column_stack([np.full(21, 0.335), np.zeros(21), phi])
+    space = np.vstack([in_space([0.335, 0.0, 0.0], turned(yaw=angle)) for angle in phi])
+    distance = np.hypot(0.6 - 0.335, 0.1)
+    aside = (corridor_cost(flat, goal) / distance - 0.05) / 0.288
+    aside_in_space = (corridor_cost(space, goal) / distance - np.pi * R**2) / (2.0 * R * LENGTH)
+    np.testing.assert_allclose(aside_in_space, aside, atol=1e-9)
+
+
 def test_random_selector_draws_every_start_equally_often() -> None:
     selector = RandomSelector(rng=np.random.default_rng(1))
     situation = Situation(p_WG=GOAL, starts=LINE)
@@ -69,10 +139,11 @@ def test_random_selector_tries_every_pose_and_base_once_before_it_gives_up() -> 
         chosen = selector.select(situation)
         seen.append(FailedReach.from_start(chosen.x0, chosen.p_WR))
     pairs = {(*reach.x0, *reach.p_WR) for reach in seen}
+    grid = APERTURES.grid
     assert len(pairs) == len(seen)
     # Many of them are the same pose with another base.
     assert len({tuple(reach.x0) for reach in seen}) < len(seen)
-    assert pairs == {(*x0, *p_WR) for x0, p_WR in zip(*APERTURES.grid, strict=True)}
+    assert pairs == {(*x0, *p_WR) for x0, p_WR in zip(grid.x0, grid.p_WR, strict=True)}
     with pytest.raises(RequestError, match="no start is left"):
         selector.select(Situation(p_WG=GOAL, starts=APERTURES, failed=tuple(seen)))
 
@@ -112,7 +183,9 @@ def test_of_equally_cheap_starts_cost_takes_the_base_nearest_to_the_goals_y(
 
 
 @pytest.mark.parametrize("starts", [LINE, APERTURES])
-def test_selected_joint_angles_put_the_hand_at_the_start(starts: Starts) -> None:
+def test_selected_joint_angles_put_the_hand_at_the_start(
+    starts: LineStarts | ApertureStarts,
+) -> None:
     chosen = CostSelector().select(Situation(p_WG=GOAL, starts=starts))
     pose = starts.poses.arm.tip_pose(chosen.q) + [*chosen.p_WR, 0.0]
     np.testing.assert_allclose(pose, chosen.x0, atol=1e-12)
@@ -131,4 +204,6 @@ def test_a_start_that_is_not_possible_is_never_a_selection(
 ) -> None:
     situation = Situation(p_WG=GOAL, starts=LINE)
     with pytest.raises(RequestError, match="the arm cannot start at"):
-        make_selection(situation, np.array(x0), np.array(p_WR), None, "test", 0.0)
+        make_selection(
+            situation, InitialConditions(np.array([x0]), np.array([p_WR])), 0, None, "test", 0.0
+        )

@@ -6,8 +6,8 @@ from lic_drake.reach.hand_poses import HandPoses
 from lic_drake.reach.starts import LineStarts
 from lic_drake.reach.task import StartLine
 from lic_drake.robots.planar import planar_arm
-from lic_drake.select.lic import LbfgsbSelector, LicSelector
 from lic_drake.select.objective import SuccessModel
+from lic_drake.select.planar_lic import PlanarLbfgsb, PlanarLic
 from lic_drake.select.situation import FailedReach, Situation
 
 
@@ -19,6 +19,6 @@ def test_a_start_that_is_barely_away_from_a_failed_one_can_be_chosen() -> None:
     peak = random_bumps(0)
     peak.centres[:] = [-0.4, -0.3]
     model = SuccessModel(estimator=peak, features=PLANAR_LIC1)
-    for kind in (LicSelector, LbfgsbSelector):
+    for kind in (PlanarLic, PlanarLbfgsb):
         chosen = kind(planar_arm(), model).select(situation)
         assert chosen.x0[1] == starts.grid.x0[0, 1] == -0.4

@@ -4,26 +4,44 @@ from select_surfaces import random_model
 
 from lic_drake.estimate.categories import features_of
 from lic_drake.estimate.features import FeatureMap
-from lic_drake.reach.starts import InitialConditions
+from lic_drake.experience.second_reach import SHOWN
+from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.select.objective import Objective
 from lic_drake.select.situation import FailedReach
 
-CATEGORIES = ["cylinder-clutter", "passage-clutter", "cylinder-aperture-clutter"]
+CATEGORIES = [
+    "cylinder-clutter",
+    "passage-clutter",
+    "cylinder-aperture-clutter",
+    "sphere-aperture-clutter",
+]
 ALL = FeatureMap(
     goal=("goal_x", "goal_y"),
     start=("start_x", "start_y", "start_phi"),
     observed=("first_start_x", "first_start_y", "first_final_x", "first_final_vx"),
 )
+ALL_IN_SPACE = FeatureMap(
+    goal=("goal_x", "goal_y", "goal_z"),
+    start=("start_x", "start_y", "start_z", "start_qx"),
+    observed=("first_start_z", "first_start_qx", "first_final_z", "first_final_vz"),
+)
 
 
-def failure(rng: np.random.Generator) -> FailedReach:
-    names = ("start_x", "start_y", "start_phi", "final_x", "final_y", "final_phi")
-    shown = {name: float(rng.uniform(-0.4, 0.7)) for name in (*names, "final_vx", "final_vy")}
-    x0 = np.array([shown[name] for name in names[:3]])
-    return FailedReach(x0=x0, p_WR=rng.uniform(-0.3, 0.3, 2), shown=shown)
+def failure(rng: np.random.Generator, in_space: bool) -> FailedReach:
+    shown = {name: float(rng.uniform(-0.4, 0.7)) for name in SHOWN}
+    angles = rng.normal(size=4) if in_space else [shown["start_phi"]]
+    place = ("start_x", "start_y", "start_z") if in_space else ("start_x", "start_y")
+    x0 = np.array([*(shown[name] for name in place), *angles])
+    torso_m = float(rng.uniform(0.0, 0.3)) if in_space else 0.0
+    return FailedReach(x0=x0, p_WR=rng.uniform(-0.3, 0.3, 2), shown=shown, torso_m=torso_m)
 
 
-def conditions(rng: np.random.Generator, n: int) -> InitialConditions:
+def conditions(rng: np.random.Generator, n: int, in_space: bool = False) -> InitialConditions:
+    if in_space:
+        place = rng.uniform([0.3, -0.4, 0.6], [0.6, 0.4, 1.2], (n, 3))
+        # The estimate is a function of seven numbers, so their length need not be 1 here.
+        x0 = np.hstack([place, rng.uniform(-1.0, 1.0, (n, 4))])
+        return InitialConditions(x0, rng.uniform(-0.3, 0.3, (n, 2)), rng.uniform(0.0, 0.3, n))
     return InitialConditions(
         rng.uniform([0.3, -0.4, -0.5], [0.4, 0.4, 1.5], (n, 3)), rng.uniform(-0.3, 0.3, (n, 2))
     )
@@ -31,10 +49,11 @@ def conditions(rng: np.random.Generator, n: int) -> InitialConditions:
 
 def objective(features: FeatureMap, failures: int, seed: int) -> Objective:
     rng = np.random.default_rng(seed)
+    p_WG = np.append(rng.uniform([0.45, -0.4], [0.85, 0.4]), 0.9 if features.in_space else 0.0)
     return Objective(
         model=random_model(seed, features),
-        p_WG=np.append(rng.uniform([0.45, -0.4], [0.85, 0.4]), 0.0),
-        failed=tuple(failure(rng) for _ in range(failures)),
+        p_WG=p_WG,
+        failed=tuple(failure(rng, features.in_space) for _ in range(failures)),
     )
 
 
@@ -42,6 +61,7 @@ CASES = [
     *((features_of(category).first, 0) for category in CATEGORIES),
     *((features_of(category).second, n) for category in CATEGORIES for n in (1, 3)),
     (ALL, 2),
+    (ALL_IN_SPACE, 2),
 ]
 
 
@@ -51,31 +71,53 @@ def test_gradients_by_pose_and_base_are_those_of_finite_differences(
     features: FeatureMap, failures: int, seed: int
 ) -> None:
     dut, step = objective(features, failures, seed), 1e-6
-    (x0,), (p_WR,) = conditions(np.random.default_rng(seed + 100), 1)
-    value, by_x0, by_b0 = dut.value_and_gradient(x0, p_WR)
-    assert value == pytest.approx(dut.values(InitialConditions(x0[None], p_WR[None]))[0])
-    moved = np.vstack([step * np.eye(5), -step * np.eye(5)]) + np.concatenate([x0, p_WR])
-    ahead, behind = dut.values(InitialConditions(moved[:, :3], moved[:, 3:])).reshape(2, 5)
+    at = conditions(np.random.default_rng(seed + 100), 1, features.in_space)
+    (x0,), (b0,) = at.x0, at.b0
+    value, by_x0, by_b0 = dut.value_and_gradient(x0, b0)
+    assert (by_x0.shape, by_b0.shape) == (x0.shape, (3,))
+    assert value == pytest.approx(dut.values(at)[0])
+    if not features.in_space:  # A robot in the plane has no torso.
+        assert by_b0[2] == 0.0
+        b0, by_b0 = b0[:2], by_b0[:2]
+    m, n = len(x0), len(x0) + len(b0)
+    moved = np.vstack([step * np.eye(n), -step * np.eye(n)]) + np.concatenate([x0, b0])
+    torso = moved[:, m + 2] if features.in_space else np.zeros(2 * n)
+    steps = InitialConditions(moved[:, :m], moved[:, m : m + 2], torso)
+    ahead, behind = dut.values(steps).reshape(2, n)
     expected = (ahead - behind) / (2 * step)
     np.testing.assert_allclose(np.concatenate([by_x0, by_b0]), expected, atol=1e-7)
 
 
 @pytest.mark.parametrize(("features", "failures"), CASES)
 def test_moving_everything_together_changes_nothing(features: FeatureMap, failures: int) -> None:
-    dut, at = objective(features, failures, 3), conditions(np.random.default_rng(5), 20)
-    offset = np.array([0.7, -1.9, 0.0])
+    dut = objective(features, failures, 3)
+    at = conditions(np.random.default_rng(5), 20, features.in_space)
+    offset = np.array([0.7, -1.9, 0.15 if features.in_space else 0.0])
+    shift = dict(zip(("_x", "_y", "_z"), offset, strict=True))
+
+    def moved_pose(x0: np.ndarray) -> np.ndarray:
+        return x0 + np.append(offset, np.zeros(x0.shape[-1] - 3))
 
     def moved(reach: FailedReach) -> FailedReach:
-        shift = {"_x": offset[0], "_y": offset[1]}
         shown = {name: x + shift.get(name[-2:], 0.0) for name, x in reach.shown.items()}
-        return FailedReach(x0=reach.x0 + offset, p_WR=reach.p_WR + offset[:2], shown=shown)
+        return FailedReach(
+            x0=moved_pose(reach.x0),
+            p_WR=reach.p_WR + offset[:2],
+            shown=shown,
+            torso_m=reach.torso_m + offset[2],
+        )
 
     there = Objective(model=dut.model, p_WG=dut.p_WG + offset, failed=tuple(map(moved, dut.failed)))
-    conditions_there = InitialConditions(at.x0 + offset, at.p_WR + offset[:2])
+    conditions_there = InitialConditions(
+        moved_pose(at.x0), at.p_WR + offset[:2], at.torso_m + offset[2]
+    )
     np.testing.assert_allclose(there.values(conditions_there), dut.values(at), rtol=1e-9)
-    # The base alone makes a difference.
-    elsewhere = InitialConditions(at.x0, at.p_WR + [0.0, 0.05])
-    assert np.all(dut.values(elsewhere) != dut.values(at))
+    # The base alone makes a difference, and so does the torso.
+    elsewhere = [InitialConditions(at.x0, at.p_WR + [0.0, 0.05], at.torso_m)]
+    if features.in_space:
+        elsewhere.append(InitialConditions(at.x0, at.p_WR, at.torso_m + 0.05))
+    for other in elsewhere:
+        assert np.all(dut.values(other) != dut.values(at))
 
 
 def test_after_several_failures_it_is_the_smallest_of_the_estimates_after_each() -> None:

@@ -6,9 +6,10 @@ from starts import APERTURES, ARM, LINE, aperture_starts, assert_possible, dense
 from lic_drake.errors import RequestError
 from lic_drake.estimate.categories import features_of
 from lic_drake.estimate.features import PLANAR_LIC1
-from lic_drake.reach.starts import InitialConditions, Starts
-from lic_drake.select.lic import LbfgsbSelector, LicSelector
+from lic_drake.reach.initial_conditions import InitialConditions
+from lic_drake.reach.starts import ApertureStarts, LineStarts
 from lic_drake.select.objective import SuccessModel
+from lic_drake.select.planar_lic import PlanarLbfgsb, PlanarLic
 from lic_drake.select.situation import FailedReach, Selection, Situation
 
 GOAL = np.array([0.6, 0.1, 0.0])
@@ -16,18 +17,18 @@ FIRST = Situation(p_WG=GOAL, starts=LINE)
 SECOND_MODEL = features_of("cylinder-clutter").second
 
 
-def lic(surface: Bumps, kind: type[LicSelector] = LicSelector) -> LicSelector:
+def lic(surface: Bumps, kind: type[PlanarLic] = PlanarLic) -> PlanarLic:
     return kind(ARM, SuccessModel(estimator=surface, features=PLANAR_LIC1))
 
 
-def value_of(selector: LicSelector, situation: Situation, chosen: Selection) -> float:
+def value_of(selector: PlanarLic, situation: Situation, chosen: Selection) -> float:
     """LIC-1's estimate for a choice, from its estimator alone."""
     y = chosen.x0[1] - chosen.p_WR[1]
     goal = situation.p_WG[:2] - chosen.p_WR
     return float(selector.first.estimator.values(np.array([[*goal, y, chosen.x0[2]]]))[0])
 
 
-def best_of_dense_scan(selector: LicSelector, situation: Situation) -> float:
+def best_of_dense_scan(selector: PlanarLic, situation: Situation) -> float:
     scan = dense_scan(situation.starts)
     return float(selector.objective(situation).values(scan.take(situation.allowed(scan))).max())
 
@@ -62,10 +63,10 @@ def test_peak_that_the_arm_cannot_take_gives_the_best_start_at_the_joint_limits(
     assert 0.0 <= margin + 1e-9 < np.deg2rad(2.0)
 
 
-@pytest.mark.parametrize("kind", [LicSelector, LbfgsbSelector])
+@pytest.mark.parametrize("kind", [PlanarLic, PlanarLbfgsb])
 @pytest.mark.parametrize("seed", range(8))
 def test_selection_matches_a_dense_scan_and_beats_every_grid_start(
-    kind: type[LicSelector], seed: int
+    kind: type[PlanarLic], seed: int
 ) -> None:
     selector = lic(random_bumps(seed), kind)
     chosen = selector.select(FIRST)
@@ -76,10 +77,10 @@ def test_selection_matches_a_dense_scan_and_beats_every_grid_start(
     assert_possible(LINE, chosen.x0, chosen.p_WR, chosen.q)
 
 
-@pytest.mark.parametrize("kind", [LicSelector, LbfgsbSelector])
+@pytest.mark.parametrize("kind", [PlanarLic, PlanarLbfgsb])
 @pytest.mark.parametrize("seed", range(5))
 def test_second_selection_keeps_away_from_the_first_and_is_the_best_there(
-    kind: type[LicSelector], seed: int
+    kind: type[PlanarLic], seed: int
 ) -> None:
     selector = lic(random_bumps(seed), kind)
     first = selector.select(FIRST)
@@ -119,10 +120,10 @@ def test_goal_with_nan_is_refused() -> None:
 # Apertures and a mobile base
 
 
-@pytest.mark.parametrize("kind", [LicSelector, LbfgsbSelector])
+@pytest.mark.parametrize("kind", [PlanarLic, PlanarLbfgsb])
 @pytest.mark.parametrize("seed", range(5))
 def test_at_apertures_the_choice_matches_a_dense_scan_over_aperture_angle_and_base(
-    kind: type[LicSelector], seed: int
+    kind: type[PlanarLic], seed: int
 ) -> None:
     selector = kind(ARM, random_model(seed))
     situation = Situation(p_WG=np.array([0.65, 0.2 - 0.1 * seed, 0.0]), starts=APERTURES)
@@ -133,8 +134,8 @@ def test_at_apertures_the_choice_matches_a_dense_scan_over_aperture_angle_and_ba
     assert chosen.probability == pytest.approx(min(value, 1.0), abs=1e-12)
 
 
-@pytest.mark.parametrize("kind", [LicSelector, LbfgsbSelector])
-def test_a_track_that_ends_early_bounds_the_base(kind: type[LicSelector]) -> None:
+@pytest.mark.parametrize("kind", [PlanarLic, PlanarLbfgsb])
+def test_a_track_that_ends_early_bounds_the_base(kind: type[PlanarLic]) -> None:
     # The surface wants the hand 0.3 m to the right of the base, which the track's end forbids.
     starts = aperture_starts([-0.35, 0.05, 0.52])
     starts.track.y_max_m = 0.1
@@ -147,9 +148,9 @@ def test_a_track_that_ends_early_bounds_the_base(kind: type[LicSelector]) -> Non
     assert value >= 0.99 * best_of_dense_scan(selector, situation)
 
 
-@pytest.mark.parametrize("kind", [LicSelector, LbfgsbSelector])
+@pytest.mark.parametrize("kind", [PlanarLic, PlanarLbfgsb])
 def test_after_a_failure_lic1_takes_the_best_of_the_other_apertures(
-    kind: type[LicSelector],
+    kind: type[PlanarLic],
 ) -> None:
     selector = kind(ARM, random_model(3))
     first = selector.select(Situation(p_WG=GOAL, starts=APERTURES))
@@ -162,11 +163,11 @@ def test_after_a_failure_lic1_takes_the_best_of_the_other_apertures(
     assert value >= 0.99 * best_of_dense_scan(selector, situation)
 
 
-@pytest.mark.parametrize("kind", [LicSelector, LbfgsbSelector])
+@pytest.mark.parametrize("kind", [PlanarLic, PlanarLbfgsb])
 @pytest.mark.parametrize("offset", [(0.0, 0.7), (-0.4, -1.3), (3.0, 20.0)])
 @pytest.mark.parametrize("after_failure", [False, True])
 def test_a_translated_situation_has_the_translated_answer_and_the_same_estimate(
-    kind: type[LicSelector], offset: tuple[float, float], after_failure: bool
+    kind: type[PlanarLic], offset: tuple[float, float], after_failure: bool
 ) -> None:
     # Equation (3): only where things are relative to each other counts.
     second = random_model(8, SECOND_MODEL)
@@ -195,9 +196,9 @@ def test_a_translated_situation_has_the_translated_answer_and_the_same_estimate(
 
 
 @pytest.mark.parametrize("starts", [LINE, APERTURES], ids=["line", "apertures"])
-@pytest.mark.parametrize("kind", [LicSelector, LbfgsbSelector])
+@pytest.mark.parametrize("kind", [PlanarLic, PlanarLbfgsb])
 def test_lic2_takes_the_best_of_all_starts_after_what_the_failure_showed(
-    kind: type[LicSelector], starts: Starts
+    kind: type[PlanarLic], starts: LineStarts | ApertureStarts
 ) -> None:
     selector = kind(ARM, random_model(1), random_model(2, SECOND_MODEL))
     answers = []
@@ -228,14 +229,14 @@ def test_lic2_may_start_where_the_first_reach_did() -> None:
     second = SuccessModel(
         estimator=Bumps(peak, np.array([0.9]), np.array([0.1, 0.3])), features=SECOND_MODEL
     )
-    selector = LicSelector(ARM, random_model(1), second)
+    selector = PlanarLic(ARM, random_model(1), second)
     situation = Situation(p_WG=GOAL, starts=LINE, failed=(failed_at(np.array([0.335, 0.05, 0.9])),))
     np.testing.assert_allclose(selector.select(situation).x0[1:], peak[0], atol=2e-3)
 
 
 def test_a_failure_that_never_began_leaves_lic1_away_from_it() -> None:
-    selector = LicSelector(ARM, random_model(1), random_model(2, SECOND_MODEL))
-    alone = LicSelector(ARM, random_model(1))
+    selector = PlanarLic(ARM, random_model(1), random_model(2, SECOND_MODEL))
+    alone = PlanarLic(ARM, random_model(1))
     first = alone.select(FIRST)
     for failed in (
         FailedReach.from_start(first.x0),
@@ -250,7 +251,7 @@ def test_a_failure_that_never_began_leaves_lic1_away_from_it() -> None:
 
 def test_after_several_failures_the_choice_maximises_the_smallest_of_their_estimates() -> None:
     second = random_model(4, SECOND_MODEL)
-    selector = LicSelector(ARM, random_model(1), second)
+    selector = PlanarLic(ARM, random_model(1), second)
     failed = (
         failed_at(np.array([0.335, -0.2, 0.5]), (0.4, -0.2)),
         failed_at(np.array([0.335, 0.2, 1.2]), (0.7, 0.3)),

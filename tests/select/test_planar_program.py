@@ -6,7 +6,7 @@ from starts import APERTURES, ARM, LINE
 
 from lic_drake.estimate.features import PLANAR_LIC1
 from lic_drake.select.objective import Objective, SuccessModel
-from lic_drake.select.program import StartProgram
+from lic_drake.select.planar_program import PlanarProgram
 
 GOAL = np.array([0.6, 0.1, 0.0])
 (REGION,) = LINE.regions
@@ -14,7 +14,7 @@ GOAL = np.array([0.6, 0.1, 0.0])
 
 @pytest.mark.parametrize("seed", range(5))
 def test_costs_and_constraints_have_the_gradients_of_finite_differences(seed: int) -> None:
-    program = StartProgram(ARM.kinematics)
+    program = PlanarProgram(ARM.kinematics)
     rng = np.random.default_rng(seed)
     # A solve sets the objective.
     program.solve(
@@ -65,7 +65,7 @@ def test_joint_limits_bound_the_solution_although_the_surface_pulls_beyond_them(
     guess = np.array([REGION.lower[0], 0.3, np.deg2rad(75.0)])
     q = ARM.solve_ik(guess)
     assert q is not None
-    x0, p_WR = StartProgram(ARM.kinematics).solve(
+    x0, p_WR = PlanarProgram(ARM.kinematics).solve(
         Objective(model=model, p_WG=GOAL), REGION, guess, np.zeros(2), q
     )
     found = ARM.solve_ik(x0 + np.array([0.0, 0.0, 1e-4]))
@@ -81,7 +81,7 @@ def test_a_mobile_base_moves_and_the_hand_stays_in_the_aperture() -> None:
     region = APERTURES.regions[1]
     at = np.all(np.abs(APERTURES.grid.x0[:, :2] - region.lower[:2]) < 1e-9, axis=1)
     guess = APERTURES.grid.take(at).take(np.array([4]))
-    x0, p_WR = StartProgram(ARM.kinematics).solve(
+    x0, p_WR = PlanarProgram(ARM.kinematics).solve(
         Objective(model=model, p_WG=GOAL),
         region,
         guess.x0[0],

@@ -7,8 +7,9 @@ from starts import ARM, LINE
 
 from lic_drake.errors import RequestError
 from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.robots.pr2 import Pr2Arm
 from lic_drake.select.baselines import CostSelector, RandomSelector
-from lic_drake.select.lic import LicSelector
+from lic_drake.select.planar_lic import PlanarLic
 from lic_drake.select.registry import (
     FallbackSelector,
     Selector,
@@ -54,9 +55,33 @@ def test_what_learns_needs_a_library(method: str) -> None:
         make_selector(method, ARM)
 
 
+def test_a_robot_without_a_selection_is_refused(columns: dict[str, np.ndarray]) -> None:
+    class Other:
+        name = "other"
+        p_RS = np.zeros(3)
+        torso_m = 0.0
+
+    with pytest.raises(RequestError, match="no selection is known for the robot 'other'"):
+        make_selector("knn", Other(), columns)  # type: ignore[arg-type]
+    # The baselines need the shoulder alone.
+    assert make_selector("rnd>cost", Other()).method == "rnd>cost"  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("torso_m", [0.0115, 0.2])
+def test_cost_knows_the_shoulder_of_a_robot_with_its_torso_at_0(torso_m: float) -> None:
+    arm = Pr2Arm(torso_m=torso_m)
+    selector = make_selector("cost", arm)
+    assert isinstance(selector, CostSelector)
+    # The torso moves the shoulder up and down and nowhere else.
+    np.testing.assert_allclose(selector.p_RS + [0.0, 0.0, torso_m], arm.p_RS, atol=1e-12)
+    planar = make_selector("cost", ARM)
+    assert isinstance(planar, CostSelector)
+    np.testing.assert_array_equal(planar.p_RS, np.zeros(3))
+
+
 def test_only_the_plain_name_has_lic2(columns: dict[str, np.ndarray]) -> None:
     both, first = make_selector("knn", ARM, columns), make_selector("knn1", ARM, columns)
-    assert isinstance(both, LicSelector) and isinstance(first, LicSelector)
+    assert isinstance(both, PlanarLic) and isinstance(first, PlanarLic)
     assert first.second is None
     assert both.second is not None
     assert both.second.features.observed == (

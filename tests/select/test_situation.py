@@ -8,8 +8,10 @@ from hypothesis import strategies as st
 from reaches import reach_request
 from starts import APERTURES, LINE
 
+from lic_drake.errors import RequestError
+from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.reach.scenario import load_scenario
-from lic_drake.reach.starts import InitialConditions, Starts
+from lic_drake.reach.starts import ApertureStarts, LineStarts
 from lic_drake.select.situation import FailedReach, Situation
 
 GOAL = np.array([0.6, 0.1, 0.0])
@@ -21,7 +23,7 @@ GOAL = np.array([0.6, 0.1, 0.0])
     st.floats(-0.4, 0.4),
 )
 def test_free_regions_are_the_allowed_positions(
-    starts: Starts, failed_y: list[float], y: float
+    starts: LineStarts | ApertureStarts, failed_y: list[float], y: float
 ) -> None:
     if starts is APERTURES:
         y = float(APERTURES.p_WA[np.argmin(np.abs(APERTURES.p_WA[:, 1] - y)), 1])
@@ -52,7 +54,7 @@ def test_free_regions_are_the_allowed_positions(
     st.lists(st.integers(0, 17), max_size=25),
 )
 def test_the_neighbourhood_of_failures_is_as_large_as_leaves_a_start_of_the_grid(
-    starts: Starts, failed_y: list[float], failed_rows: list[int]
+    starts: LineStarts | ApertureStarts, failed_y: list[float], failed_rows: list[int]
 ) -> None:
     grid = starts.grid
     failed = [FailedReach.from_start(np.array([0.335, value, 0.5])) for value in failed_y]
@@ -65,7 +67,7 @@ def test_the_neighbourhood_of_failures_is_as_large_as_leaves_a_start_of_the_grid
     repeated = np.array(
         [
             any(np.allclose(x0, r.x0) and np.allclose(p_WR, r.p_WR) for r in failed)
-            for x0, p_WR in zip(*grid, strict=True)
+            for x0, p_WR in zip(grid.x0, grid.p_WR, strict=True)
         ]
     )
     np.testing.assert_array_equal(situation.untried(grid), ~repeated)
@@ -88,3 +90,72 @@ def test_a_failed_reach_shows_what_its_record_says_in_the_world(y_m: float) -> N
     np.testing.assert_array_equal(
         [failed.shown[name] for name in final], [getattr(record, name) for name in final]
     )
+
+
+# In space
+
+
+class InSpace:
+    """Tools at three heights and two places across x, each from two heights of the torso."""
+
+    def __init__(self) -> None:
+        places = [(y, z) for y in (-0.3, 0.1) for z in (0.7, 0.9, 1.1)]
+        x0 = np.array([[0.53, y, z, 1.0, 0.0, 0.0, 0.0] for y, z in places])
+        torso_m = np.repeat([0.1, 0.2], len(x0))
+        self.grid = InitialConditions(np.vstack([x0, x0]), np.zeros((12, 2)), torso_m)
+
+    def angles(self, x0: np.ndarray, p_WR: np.ndarray, torso_m: float) -> np.ndarray | None:
+        return np.zeros(7)
+
+
+def test_in_space_starts_keep_their_distance_across_x_in_both_directions() -> None:
+    starts = InSpace()
+    at = np.array([0.53, -0.3, 0.9, 1.0, 0.0, 0.0, 0.0])
+    near = np.linalg.norm(starts.grid.x0[:, 1:3] - [-0.3, 0.9], axis=1) <= 0.1
+    assert np.count_nonzero(near) == 2  # The same place from both heights of the torso.
+    situation = Situation(
+        p_WG=GOAL, starts=starts, failed=(FailedReach.from_start(at, np.zeros(2), 0.1),)
+    )
+    np.testing.assert_array_equal(situation.allowed(starts.grid), ~near)
+    # Deeper or further up the way makes no difference.
+    deeper = InitialConditions(starts.grid.x0 + np.eye(7)[0], starts.grid.p_WR, starts.grid.torso_m)
+    np.testing.assert_array_equal(situation.allowed(deeper), ~near)
+
+
+def test_the_same_pose_from_another_torso_is_another_start() -> None:
+    starts = InSpace()
+    failed = tuple(FailedReach.from_start(x0, np.zeros(2), 0.1) for x0 in starts.grid.x0[:6])
+    situation = Situation(p_WG=GOAL, starts=starts, failed=failed)
+    from_above = starts.grid.torso_m == 0.2
+    np.testing.assert_array_equal(situation.untried(starts.grid), from_above)
+    # No place is left at a distance, so that all that did not fail may be tried.
+    assert situation.retry_distance_m == -1.0
+    np.testing.assert_array_equal(situation.allowed(starts.grid), from_above)
+
+
+def test_a_failure_in_space_is_known_by_position_quaternion_and_torso() -> None:
+    x0 = np.array([0.53, -0.3, 0.9, 0.8, 0.6, 0.0, 0.0])
+    failed = FailedReach.from_start(x0, np.array([0.0, 0.1]), 0.2)
+    assert failed.torso_m == 0.2
+    names = [f"start_{axis}" for axis in ("x", "y", "z", "qw", "qx", "qy", "qz")]
+    assert list(failed.shown) == names
+    np.testing.assert_array_equal([failed.shown[name] for name in names], x0)
+
+
+def test_a_failed_reach_in_space_shows_heights_and_torso_of_its_record() -> None:
+    planar = make_record(reach_request(load_scenario("cylinder-clutter")))
+    heights = {"start_z": 0.9, "start_qx": 0.6, "final_z": 1.0, "final_vz": -0.1, "torso": 0.2}
+    record = replace(planar, start_qw=0.8, **heights)
+    failed = FailedReach.from_record(record)
+    np.testing.assert_array_equal(
+        failed.x0, [record.start_x, record.start_y, 0.9, 0.8, 0.6, 0.0, 0.0]
+    )
+    assert failed.torso_m == 0.2
+    assert [failed.shown[name] for name in list(heights)[:4]] == [0.9, 0.6, 1.0, -0.1]
+
+
+def test_what_is_planar_is_refused_in_space() -> None:
+    situation = Situation(p_WG=GOAL, starts=InSpace())
+    for ask in (lambda: situation.planar_starts, situation.free_regions):
+        with pytest.raises(RequestError, match="needs the start line of a planar arm"):
+            ask()
