@@ -29,9 +29,7 @@ class GradientBoosting:
 
         Z, f = checks.checked_rows(Z, f)
         if np.all(f == f[0]):
-            raise checks.EstimateError(
-                "all reaches ended alike; boosting needs successes and failures"
-            )
+            raise checks.EstimateError("all reaches ended alike; trees need successes and failures")
         leaf = max(2, min(20, len(f) // 20))
         model = HistGradientBoostingClassifier(max_iter=60, min_samples_leaf=leaf, random_state=0)
         self._model, self._scale = model.fit(Z, f), checks.feature_scale(Z)

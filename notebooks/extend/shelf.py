@@ -36,8 +36,8 @@ class ShelfClutter:
     def sample(self, rng: np.random.Generator) -> ClutterInstance:
         """Draws one environment: boxes turned at random, none overlapping another or a wall."""
         n, half, radius = self.num_boxes, 0.5 * self.width_m, self.max_edge_m / np.sqrt(2.0)
-        lower = np.array([self.front_x_m, -half]) + radius
-        upper = np.array([self.back_x_m, half]) - radius
+        lower = np.array([self.front_x_m, -half]) + radius + 0.5 * self.wall_m
+        upper = np.array([self.back_x_m, half]) - radius - 0.5 * self.wall_m
         centres = place_discs(rng, n, lower, upper, 2.0 * radius)
         edges = rng.uniform(self.min_edge_m, self.max_edge_m, (n, 2))
         middle, depth = 0.5 * (self.front_x_m + self.back_x_m), self.back_x_m - self.front_x_m
