@@ -69,8 +69,8 @@ class ReachRecording:
         self._drawing = Simulation(diagram, scenario.scene)
         if instance.num_axes == 2:
             self._draw_start_line()
-        self._meshcat.SetProperty("/Background", "top_color", [0.97, 0.97, 0.98])
-        self._meshcat.SetProperty("/Background", "bottom_color", [0.97, 0.97, 0.98])
+        self._meshcat.SetProperty("/Background/<object>", "top_color", [0.97, 0.97, 0.98])
+        self._meshcat.SetProperty("/Background/<object>", "bottom_color", [0.97, 0.97, 0.98])
         self._meshcat.SetProperty("/Grid", "visible", False)
         self._meshcat.SetProperty("/Axes", "visible", False)
         self._meshcat.SetCameraPose(*_CAMERA[instance.num_axes])
