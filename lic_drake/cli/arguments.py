@@ -64,3 +64,8 @@ def add_library_argument(parser: argparse.ArgumentParser) -> None:
         metavar="FOLDER",
         help="experience library (default: the shipped one for cylinder-clutter)",
     )
+
+
+def add_json_argument(parser: argparse.ArgumentParser) -> None:
+    """Adds --json, for output that a machine reads."""
+    parser.add_argument("--json", action="store_true", help="print one JSON object (default: text)")

@@ -6,10 +6,20 @@ import sys
 from collections.abc import Sequence
 
 import lic_drake
-from lic_drake.cli import bench, collect, demo, evaluate, exit_codes, experience, reach, select
+from lic_drake.cli import (
+    bench,
+    collect,
+    demo,
+    evaluate,
+    exit_codes,
+    experience,
+    gallery,
+    reach,
+    select,
+)
 from lic_drake.errors import LicError
 
-SUBCOMMANDS = (demo, reach, select, collect, experience, evaluate, bench)
+SUBCOMMANDS = (demo, reach, select, collect, experience, evaluate, gallery, bench)
 """Modules with `add_parser(subparsers)`, which sets `run(args) -> int` as a parser default."""
 
 
