@@ -23,7 +23,11 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.add_argument("what", choices=["reach"], help="what to measure")
     add_scenario_arguments(parser)
     parser.add_argument(
-        "--reaches", type=positive_int, default=50, metavar="N", help="default: %(default)s"
+        "--reaches",
+        type=positive_int,
+        default=50,
+        metavar="N",
+        help="number of reaches to measure (default: %(default)s)",
     )
     add_json_argument(parser)
     parser.set_defaults(run=run)

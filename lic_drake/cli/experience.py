@@ -76,7 +76,11 @@ def _add_recompute(actions: Subparsers) -> None:
     )
     _add_library(parser)
     parser.add_argument(
-        "--rows", metavar="N", type=positive_int, default=100, help="default: %(default)s"
+        "--rows",
+        metavar="N",
+        type=positive_int,
+        default=100,
+        help="number of rows to simulate (default: %(default)s)",
     )
     parser.add_argument(
         "--seed", metavar="N", type=int, default=0, help="draws the rows (default: %(default)s)"
