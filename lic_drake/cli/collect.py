@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from lic_drake.experience.grid import CollectionRequest
 
 DEFAULT_SCENARIO = "cylinder-clutter"
+"""Scenario of a new library when none is asked for."""
 
 
 def add_parser(subparsers: Subparsers) -> None:

@@ -14,6 +14,7 @@ from lic_drake.extensions import load_extensions
 from lic_drake.registration import add_entry
 
 EstimatorFactory = Callable[[FeatureMap], SuccessEstimator]
+"""Returns a new, unfitted estimator for what its features mean."""
 
 _ESTIMATORS: dict[str, EstimatorFactory] = {}
 

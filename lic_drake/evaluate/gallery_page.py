@@ -24,6 +24,7 @@ HEADS = (
     "nearest to goal, mm",
     "peak force, N",
 )
+"""Heads of the table of attempts."""
 
 _STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; color: #222; background: #f7f7f8;

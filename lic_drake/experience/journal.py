@@ -10,6 +10,7 @@ from lic_drake.experience.schema import FIELDS, TUPLES
 from lic_drake.reach.request import ReachRecord
 
 SUFFIX = ".partial.jsonl"
+"""End of a journal's file name."""
 
 _SUCCESS = b'"success": true'
 

@@ -23,6 +23,7 @@ from lic_drake.reach.request import ReachRecord
 from lic_drake.reach.scenario import Scenario, parse_scenario
 
 SUFFIX = ".parquet"
+"""End of a shard's file name."""
 
 COMPACTED = "reaches"
 """Name of the shard that holds all rows after `ExperienceLibrary.compact`."""

@@ -18,6 +18,7 @@ from lic_drake.robots.planar_kinematics import PlanarArmKinematics
 from lic_drake.robots.skin_shape import SkinShape
 
 LINK_NAMES = ("link1", "link2", "link3")
+"""Names of the links in a description, proximal to distal."""
 
 _MOVES = np.tri(3)
 """1 where a joint (column) moves a link (row)."""

@@ -13,8 +13,11 @@ from lic_drake.select.situation import Selection, Situation
 Vector = NDArray[np.float64]
 
 HAND_LENGTH_M = 0.288
+"""Length of the last link with the tip, metres."""
 HAND_RADIUS_M = 0.015
+"""Radius of its skin, metres."""
 OBJECT_RADIUS_M = 0.01
+"""Radius of a cylinder, metres."""
 
 
 def corridor_cost(x0: Vector, p_WG: Vector) -> Vector:
