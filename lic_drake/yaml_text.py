@@ -8,7 +8,7 @@ MAX_DEPTH = 50
 """Deeper nesting is refused."""
 
 
-class _PlainLoader(yaml.SafeLoader):
+class _PlainLoader(yaml.SafeLoader):  # type: ignore[misc]
     """Builds plain data only, and refuses what could make a short text endless."""
 
     _depth = 0

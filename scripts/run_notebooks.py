@@ -17,7 +17,7 @@ MAX_OUTPUT_BYTES = 150_000
 
 def run_notebook(path: Path) -> nbformat.NotebookNode:
     """Returns a notebook with the outputs that it has where it lies."""
-    notebook = nbformat.read(path, as_version=4)
+    notebook: nbformat.NotebookNode = nbformat.read(path, as_version=4)  # type: ignore[no-untyped-call]
     where = {"metadata": {"path": path.parent}}
     NotebookClient(notebook, timeout=300, kernel_name="python3", resources=where).execute()
     return notebook
@@ -43,7 +43,7 @@ def main() -> None:
         began = time.perf_counter()
         notebook = run_notebook(path)
         keep_small_outputs(notebook)
-        nbformat.write(notebook, path)
+        nbformat.write(notebook, path)  # type: ignore[no-untyped-call]
         size = path.stat().st_size
         print(f"{path}: {time.perf_counter() - began:.0f} s, {size / 1000:.0f} kB")
 
