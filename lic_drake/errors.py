@@ -22,3 +22,10 @@ class LibraryError(LicError):
 
 class ClusterError(LicError):
     """A cluster cannot be reached, or its workers cannot be used as they are."""
+
+
+def quoted(value: object) -> str:
+    """Returns what a file says for a message: on one line, and not longer than is useful."""
+    text = str(value)
+    short = text if len(text) <= 40 else f"{text[:40]}..."
+    return short if short.isprintable() else ascii(short)

@@ -10,6 +10,7 @@ from lic_drake.clutter.placement import place_discs
 from lic_drake.errors import ScenarioError
 
 MAX_SPHERES = 1000
+"""More spheres are refused: the simulation would not finish in useful time."""
 MAX_APERTURES = 20
 """A board with more rows or columns is refused."""
 

@@ -19,6 +19,7 @@ from lic_drake.scene.scene import FIXED_COLOR, MOVABLE_COLOR
 Vector = NDArray[np.float64]
 
 ATTEMPT_COLORS = ("tab:blue", "tab:purple", "tab:green", "tab:olive", "tab:cyan")
+"""Colours of the first and further attempts, over and over again."""
 
 
 def draw_density(

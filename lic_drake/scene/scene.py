@@ -38,8 +38,11 @@ CONTACT_APPROXIMATIONS = ("sap", "similar", "lagged")
 """Drake's names for the ways in which a discrete plant solves contact."""
 
 FIXED_COLOR = np.array([0.55, 0.25, 0.20, 1.0])
+"""Of objects that cannot be pushed, RGBA."""
 MOVABLE_COLOR = np.array([0.95, 0.70, 0.35, 1.0])
+"""Of objects that can be pushed, RGBA."""
 BASE_COLOR = np.array([0.35, 0.38, 0.45, 1.0])
+"""Of a mobile base, RGBA."""
 
 
 @dataclass(kw_only=True)
