@@ -22,3 +22,11 @@ class LibraryError(LicError):
 
 class ClusterError(LicError):
     """A cluster cannot be reached, or its workers cannot be used as they are."""
+
+
+class RenderingError(LicError):
+    """Cameras cannot be simulated on this machine as it is."""
+
+
+class PerceptionError(LicError):
+    """What was looked for cannot be found in the images."""

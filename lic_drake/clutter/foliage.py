@@ -37,6 +37,8 @@ class FoliageApertureClutter(ApertureBoard):
     lower: list[float] = field(default_factory=lambda: [0.54, -0.69, 0.48])
     upper: list[float] = field(default_factory=lambda: [0.81, 0.31, 1.4])
     margin_m: float = 0.05
+    # Height of the trough that holds the roots, metres.
+    trough_m: float = 0.15
     # Springy stems and fixed branches; the share of both that hangs; distance between roots.
     num_stems: int = 40
     num_branches: int = 6
@@ -69,7 +71,7 @@ class FoliageApertureClutter(ApertureBoard):
                 f"leaves_per_stem must be from 0 to {MAX_LEAVES}, got {self.leaves_per_stem}"
             )
         for name in (
-            *("cover_m", "margin_m", "root_distance_m", "stem_radius_m", "branch_radius_m"),
+            *("cover_m", "margin_m", "trough_m", "root_distance_m", "stem_radius_m", "branch_radius_m"),
             *("rigidity_N_m2", "stem_kg_per_m", "damping_ratio", "leaf_thickness_m", "leaf_kg"),
         ):
             value = getattr(self, name)
@@ -130,7 +132,7 @@ class FoliageApertureClutter(ApertureBoard):
         hangs = rng.random(len(p_WA)) < 0.5
         shares[order[: self.num_blocked]] = 1.0
         covered = np.sort(order[: self.num_blocked + self.num_partly_covered])
-        p_WB, edges = self.bar_boxes()
+        p_WB, edges = map(np.vstack, zip(self.bar_boxes(), self._supports(), strict=True))
         n, k = len(p_WB), len(covered)
         return ClutterInstance(
             category="foliage-aperture-clutter",
@@ -142,8 +144,17 @@ class FoliageApertureClutter(ApertureBoard):
             movable=np.zeros(n + k, dtype=bool),
             p_WA=np.delete(p_WA, covered, axis=0),
             stems=stems,
-            material=("wood",) * n + ("cardboard",) * k,
+            material=("wood",) * (n - 2) + ("clay", "wood") + ("cardboard",) * k,
         )
+
+    def _supports(self) -> tuple[Vector, Vector]:
+        """Returns centres and edges of the trough below and the beam above, each shape (2, 3)."""
+        low, high, up = np.array(self.lower), np.array(self.upper), np.eye(3)[2]
+        middle, edges = 0.5 * (low + high), high - low
+        trough, beam = edges.copy(), edges.copy()
+        trough[2], beam[2] = self.trough_m, self.bar_m
+        p_WB = [middle - 0.5 * (edges + trough) * up, middle + 0.5 * (edges + beam) * up]
+        return np.array(p_WB), np.array([trough, beam])
 
     def _cover_edges(self, shares: Vector) -> Vector:
         width = np.full(len(shares), self.aperture_m)

@@ -19,6 +19,7 @@ LEAF_COLORS = np.array(
 
 MATERIAL_COLORS = {
     "wood": np.array([0.43, 0.27, 0.14, 1.0]),
+    "clay": np.array([0.52, 0.30, 0.24, 1.0]),
     "cardboard": np.array([0.70, 0.55, 0.38, 1.0]),
 }
 """Colours of the materials that a `ClutterInstance` may name."""

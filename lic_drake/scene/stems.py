@@ -4,8 +4,16 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import Box, CollisionFilterDeclaration, Cylinder, Ellipsoid, GeometryId
-from pydrake.geometry import GeometrySet, ProximityProperties, SceneGraph
+from pydrake.geometry import (
+    Box,
+    CollisionFilterDeclaration,
+    Convex,
+    Cylinder,
+    GeometryId,
+    GeometrySet,
+    ProximityProperties,
+    SceneGraph,
+)
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
@@ -80,11 +88,10 @@ def add_stems(
             )
         )
         if visuals:
-            # A leaf is rounder than the plate that is touched.
             plant.RegisterVisualGeometry(
                 bodies[i],
                 X_BL,
-                Ellipsoid(0.5 * stems.leaf_size[j]),
+                _leaf_shape(stems.leaf_size[j]),
                 f"leaf{j}_visual",
                 LEAF_COLORS[j % len(LEAF_COLORS)],
             )
@@ -99,6 +106,20 @@ def _root_in_body(stems: Stems, i: int) -> RigidTransform:
     if stems.fixed[i]:
         return RigidTransform(RotationMatrix(stems.R_WS[i]), stems.p_WH[i])
     return RigidTransform()
+
+
+def _leaf_shape(size: Vector) -> Convex:
+    """Returns what a leaf looks like: an oval, pointed where it ends, within the plate's edges.
+
+    As an ellipsoid every leaf would be drawn with thousands of triangles.
+    """
+    angle = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+    along = np.cos(angle)
+    across = np.sin(angle) * (1.0 - 0.35 * np.maximum(along, 0.0))
+    rim = np.stack([along, across / np.abs(across).max(), np.zeros_like(angle)])
+    middle = np.array([[-0.1, -0.1], [0.0, 0.0], [1.0, -1.0]])
+    points = 0.5 * size[:, np.newaxis] * np.hstack([rim, middle])
+    return Convex(points, "leaf")
 
 
 def _add_hinged_body(
