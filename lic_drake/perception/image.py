@@ -36,7 +36,7 @@ class CameraImage:
     def rays(self) -> Vector:
         """Returns p_CQ of the points at depth 1 that the pixels show, shape (height, width, 3)."""
         height, width = self.shape
-        # As Drake has it, the centre is half a pixel off that of the first pixel's numbering.
+        # Pixels are numbered by their centres; the optical axis is in the middle of the image.
         u = (np.arange(width) - (0.5 * width - 0.5)) / self.focal_px
         v = (np.arange(height) - (0.5 * height - 0.5)) / self.focal_px
         u, v = np.meshgrid(u, v)
@@ -48,8 +48,15 @@ class CameraImage:
         Args:
             p_WQ: Points before the camera, shape (n, 3), metres.
         """
-        p_CQ = (p_WQ - self.p_WC) @ self.R_WC
+        return self.project_from_camera((p_WQ - self.p_WC) @ self.R_WC)
+
+    def project_from_camera(self, p_CQ: Vector) -> Vector:
+        """Returns where points appear, (column, row), shape (.., 2), pixels.
+
+        Args:
+            p_CQ: Points in the camera's frame, shape (.., 3), metres.
+        """
         height, width = self.shape
         centre = np.array([0.5 * width - 0.5, 0.5 * height - 0.5])
-        pixels: Vector = self.focal_px * p_CQ[:, :2] / p_CQ[:, 2:] + centre
+        pixels: Vector = self.focal_px * p_CQ[..., :2] / p_CQ[..., 2:] + centre
         return pixels
