@@ -1,0 +1,62 @@
+"""Measures perception in random scenes of the foliage: apertures, which of them are open, the goal.
+
+    python scripts/measure_perception.py notebooks/results/perception
+
+Writes perception.md, apertures.parquet and goals.parquet. The scenes are environments of the
+evaluation stream; nothing was tried out on them.
+"""
+
+import argparse
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+from tqdm import tqdm
+
+from lic_drake.evaluate.perception_errors import (
+    ApertureError,
+    GoalError,
+    measure_scene,
+    perception_report,
+)
+from lic_drake.perception.config import load_cameras
+from lic_drake.reach.scenario import load_scenario
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("results", type=Path, help="folder for the results")
+    parser.add_argument("--scenario", default="foliage-aperture-clutter")
+    parser.add_argument("--cameras", default="foliage")
+    parser.add_argument("--scenes", type=int, default=200)
+    args = parser.parse_args()
+    scenario, cameras = load_scenario(args.scenario), load_cameras(args.cameras)
+    apertures: list[ApertureError] = []
+    goals: list[GoalError] = []
+    for scene in tqdm(range(args.scenes), unit="scene"):
+        of_board, of_goal = measure_scene(scenario, cameras, scene)
+        apertures += of_board
+        goals += of_goal
+    args.results.mkdir(parents=True, exist_ok=True)
+    for name, rows in (("apertures", apertures), ("goals", goals)):
+        table = pa.Table.from_pylist([asdict(row) for row in rows])
+        pq.write_table(table, args.results / f"{name}.parquet", compression="zstd")
+    camera = cameras.head.camera
+    text = (
+        "# Perception of the foliage's apertures and goal\n\n"
+        f"`python scripts/measure_perception.py` in {args.scenes} scenes of {args.scenario}"
+        f" (scenario {scenario.digest}). Cameras' errors: depth"
+        f" {1e3 * camera.noise.depth_sigma_per_m:.2f} mm (standard deviation) and steps of"
+        f" {1e3 * camera.noise.depth_step_per_m:.2f} mm at 1 m, growing with its square; pose"
+        f" {1e3 * camera.pose_error.translation_m:.1f} mm and {camera.pose_error.rotation_deg}"
+        " degrees along and about each axis.\n\n" + perception_report(apertures, goals)
+    )
+    (args.results / "perception.md").write_text(text, encoding="utf-8")
+    print(text, end="")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
