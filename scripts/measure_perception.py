@@ -21,8 +21,37 @@ from lic_drake.evaluate.perception_errors import (
     measure_scene,
     perception_report,
 )
-from lic_drake.perception.config import load_cameras
-from lic_drake.reach.scenario import load_scenario
+from lic_drake.perception.config import CamerasConfig, load_cameras
+from lic_drake.reach.scenario import Scenario, load_scenario
+
+SAVE_EVERY = 20
+"""After so many scenes the results so far are written."""
+
+
+def save(
+    results: Path,
+    scenario: Scenario,
+    cameras: CamerasConfig,
+    apertures: list[ApertureError],
+    goals: list[GoalError],
+) -> str:
+    """Writes what was measured so far, and returns the report."""
+    results.mkdir(parents=True, exist_ok=True)
+    for name, rows in (("apertures", apertures), ("goals", goals)):
+        table = pa.Table.from_pylist([asdict(row) for row in rows])
+        pq.write_table(table, results / f"{name}.parquet", compression="zstd")
+    camera = cameras.head.camera
+    text = (
+        "# Perception of the foliage's apertures and goal\n\n"
+        f"`python scripts/measure_perception.py` in {len(goals) // 2} scenes of"
+        f" {scenario.category} (scenario {scenario.digest}). Cameras' errors: depth"
+        f" {1e3 * camera.noise.depth_sigma_per_m:.2f} mm (standard deviation) and steps of"
+        f" {1e3 * camera.noise.depth_step_per_m:.2f} mm at 1 m, growing with its square; pose"
+        f" {1e3 * camera.pose_error.translation_m:.1f} mm and {camera.pose_error.rotation_deg}"
+        " degrees along and about each axis.\n\n" + perception_report(apertures, goals)
+    )
+    (results / "perception.md").write_text(text, encoding="utf-8")
+    return text
 
 
 def main() -> int:
@@ -32,6 +61,8 @@ def main() -> int:
     parser.add_argument("--cameras", default="foliage")
     parser.add_argument("--scenes", type=int, default=200)
     args = parser.parse_args()
+    if args.scenes < 1:
+        parser.error(f"--scenes must be at least 1, got {args.scenes}")
     scenario, cameras = load_scenario(args.scenario), load_cameras(args.cameras)
     apertures: list[ApertureError] = []
     goals: list[GoalError] = []
@@ -39,21 +70,8 @@ def main() -> int:
         of_board, of_goal = measure_scene(scenario, cameras, scene)
         apertures += of_board
         goals += of_goal
-    args.results.mkdir(parents=True, exist_ok=True)
-    for name, rows in (("apertures", apertures), ("goals", goals)):
-        table = pa.Table.from_pylist([asdict(row) for row in rows])
-        pq.write_table(table, args.results / f"{name}.parquet", compression="zstd")
-    camera = cameras.head.camera
-    text = (
-        "# Perception of the foliage's apertures and goal\n\n"
-        f"`python scripts/measure_perception.py` in {args.scenes} scenes of {args.scenario}"
-        f" (scenario {scenario.digest}). Cameras' errors: depth"
-        f" {1e3 * camera.noise.depth_sigma_per_m:.2f} mm (standard deviation) and steps of"
-        f" {1e3 * camera.noise.depth_step_per_m:.2f} mm at 1 m, growing with its square; pose"
-        f" {1e3 * camera.pose_error.translation_m:.1f} mm and {camera.pose_error.rotation_deg}"
-        " degrees along and about each axis.\n\n" + perception_report(apertures, goals)
-    )
-    (args.results / "perception.md").write_text(text, encoding="utf-8")
+        if (scene + 1) % SAVE_EVERY == 0 or scene + 1 == args.scenes:
+            text = save(args.results, scenario, cameras, apertures, goals)
     print(text, end="")
     return 0
 

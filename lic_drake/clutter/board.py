@@ -1,4 +1,4 @@
-"""The board with a grid of square apertures that stands before clutter in space (paper IV-B, V-B)."""
+"""The board with square apertures that stands before clutter in space (paper IV-B, V-B)."""
 
 from dataclasses import dataclass, field
 

@@ -71,7 +71,14 @@ class FoliageApertureClutter(ApertureBoard):
                 f"leaves_per_stem must be from 0 to {MAX_LEAVES}, got {self.leaves_per_stem}"
             )
         for name in (
-            *("cover_m", "margin_m", "trough_m", "root_distance_m", "stem_radius_m", "branch_radius_m"),
+            *(
+                "cover_m",
+                "margin_m",
+                "trough_m",
+                "root_distance_m",
+                "stem_radius_m",
+                "branch_radius_m",
+            ),
             *("rigidity_N_m2", "stem_kg_per_m", "damping_ratio", "leaf_thickness_m", "leaf_kg"),
         ):
             value = getattr(self, name)
@@ -128,7 +135,7 @@ class FoliageApertureClutter(ApertureBoard):
         stems = self._grow(rng)
         p_WA = self.aperture_centres()
         order = rng.permutation(len(p_WA))
-        shares = rng.uniform(*self.covered_share, size=len(p_WA))
+        shares = _draw(rng, self.covered_share, len(p_WA))
         hangs = rng.random(len(p_WA)) < 0.5
         shares[order[: self.num_blocked]] = 1.0
         covered = np.sort(order[: self.num_blocked + self.num_partly_covered])
@@ -175,11 +182,14 @@ class FoliageApertureClutter(ApertureBoard):
     def _grow(self, rng: np.random.Generator) -> Stems:
         m = self.num_stems + self.num_branches
         fixed = np.arange(m) >= self.num_stems
-        low, high = np.array(self.lower[:2]) + self.margin_m, np.array(self.upper[:2]) - self.margin_m
+        low, high = (
+            np.array(self.lower[:2]) + self.margin_m,
+            np.array(self.upper[:2]) - self.margin_m,
+        )
         roots = place_discs(rng, m, low, high, self.root_distance_m)
         hangs = rng.random(m) < self.hanging_share
         length = np.where(
-            fixed, rng.uniform(*self.branch_length_m, m), rng.uniform(*self.stem_length_m, m)
+            fixed, _draw(rng, self.branch_length_m, m), _draw(rng, self.stem_length_m, m)
         )
         p_WH = np.column_stack([roots, np.where(hangs, self.upper[2], self.lower[2])])
         R_WS = np.array([self._slant(rng, *row) for row in zip(p_WH, length, hangs, strict=True)])
@@ -193,7 +203,9 @@ class FoliageApertureClutter(ApertureBoard):
         mass = self.stem_kg_per_m * length + self.leaf_kg * self.leaves_per_stem
         inertia = mass * length**2 / 3.0
         damping = np.where(
-            fixed, 0.0, 2.0 * self.damping_ratio * np.sqrt(3.0 * self.rigidity_N_m2 / length * inertia)
+            fixed,
+            0.0,
+            2.0 * self.damping_ratio * np.sqrt(3.0 * self.rigidity_N_m2 / length * inertia),
         )
         return Stems(
             p_WH=p_WH,
@@ -212,7 +224,10 @@ class FoliageApertureClutter(ApertureBoard):
     def _slant(self, rng: np.random.Generator, p_WH: Vector, length: float, hangs: bool) -> Vector:
         """Draws R_WS of a stem whose tip stays within the box."""
         for _ in range(MAX_TRIES):
-            slant, azimuth = np.deg2rad(self.max_slant_deg) * rng.random(), rng.uniform(0, 2 * np.pi)
+            slant, azimuth = (
+                np.deg2rad(self.max_slant_deg) * rng.random(),
+                rng.uniform(0, 2 * np.pi),
+            )
             R_WS = _rotation(azimuth, np.pi - slant if hangs else slant)
             if self._holds(p_WH + length * R_WS[:, 2], self.margin_m):
                 return R_WS
@@ -228,8 +243,8 @@ class FoliageApertureClutter(ApertureBoard):
         for _ in range(MAX_TRIES):
             size = np.array(
                 [
-                    rng.uniform(*self.leaf_length_m),
-                    rng.uniform(*self.leaf_width_m),
+                    _draw(rng, self.leaf_length_m, 1)[0],
+                    _draw(rng, self.leaf_width_m, 1)[0],
                     self.leaf_thickness_m,
                 ]
             )
@@ -253,6 +268,10 @@ class FoliageApertureClutter(ApertureBoard):
         inset = np.array([margin, margin, 0.0])
         low, high = np.array(self.lower) + inset, np.array(self.upper) - inset
         return bool(np.all(p_WQ >= low) and np.all(p_WQ <= high))
+
+
+def _draw(rng: np.random.Generator, ends: list[float], n: int) -> Vector:
+    return rng.uniform(ends[0], ends[1], n)
 
 
 def _rotation(azimuth: float, tilt: float) -> Vector:

@@ -19,7 +19,7 @@ Vector = NDArray[np.float64]
 STATES = ("open", "partly", "blocked", "unseen")
 
 NEAR_M = 0.03
-"""What is no further behind the front of the board covers it; what is further before it hides it."""
+"""What is no further behind the board's front covers it; what is further before it hides it."""
 
 OPEN_SHARE, BLOCKED_SHARE = 0.15, 0.85
 """An aperture is open, or blocked, if less, or more, than this share of it is covered."""
@@ -126,7 +126,10 @@ def find_apertures(
     return DetectedApertures(
         p_WA=p_WA,
         covariance=np.array(
-            [_covariance(image, plane, camera, grid, c, p) for c, p in zip(centres, p_WA, strict=True)]
+            [
+                _covariance(image, plane, camera, grid, c, p)
+                for c, p in zip(centres, p_WA, strict=True)
+            ]
         ),
         corners=_in_world(image, plane, corners, 0.0),
         covered=covered,

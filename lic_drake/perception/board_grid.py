@@ -58,7 +58,9 @@ class BoardGrid:
     def bar_points(self, step_m: float) -> Vector:
         """Returns points on the middle lines of the bars, of the board, shape (n, 2)."""
         half = 0.5 * self.aperture_m * np.array([self.columns, self.rows])
-        lines = [np.linspace(-h, h, n + 1) for h, n in zip(half, (self.columns, self.rows), strict=True)]
+        lines = [
+            np.linspace(-h, h, n + 1) for h, n in zip(half, (self.columns, self.rows), strict=True)
+        ]
         along = [np.arange(-h, h, step_m) for h in half]
         upright = np.stack(np.meshgrid(lines[0], along[1]), axis=-1).reshape(-1, 2)
         level = np.stack(np.meshgrid(along[0], lines[1]), axis=-1).reshape(-1, 2)
@@ -187,10 +189,12 @@ def _refine(
 ) -> tuple[Vector, Vector]:
     """Returns centre, angle and bar width by the edges near a guess, and their covariance."""
     counts = (columns, rows)
-    lines, sides, points = [], [], []
+    lines: list[Vector] = []
+    sides: list[Vector] = []
+    points: list[Vector] = []
     for axis, (found, count) in enumerate(zip(edges, counts, strict=True)):
         at = _to_board(guess, found[:, :2])
-        bars = aperture_m * (np.arange(count + 1) - 0.5 * count)
+        bars: Vector = aperture_m * (np.arange(count + 1) - 0.5 * count)
         nearest = np.argmin(np.abs(at[:, axis, np.newaxis] - bars), axis=1)
         expected = _seen_edges(guess, bars[nearest], found[:, 2], eye, axis)
         off = at[:, axis] - expected
@@ -233,7 +237,8 @@ def _seen_edges(x: Vector, line: Vector, side: Vector, eye: Vector, axis: int) -
     """
     front = line + 0.5 * side * x[3]
     to_eye = _to_board(x, eye[np.newaxis, 1:])[0, axis] - front
-    return front + np.where(to_eye * side > 0.0, to_eye * x[3] / (eye[0] + x[3]), 0.0)
+    seen: Vector = front + np.where(to_eye * side > 0.0, to_eye * x[3] / (eye[0] + x[3]), 0.0)
+    return seen
 
 
 def _to_board(x: Vector, at: Vector) -> Vector:

@@ -29,7 +29,8 @@ class BoardPlane:
 
     Attributes:
         p_CO: A point of it, where the optical axis meets it, shape (3,), metres.
-        R_CB: Axes Bx away from the camera, across the board, By to its left and Bz up, shape (3, 3).
+        R_CB: Axes Bx away from the camera, across the board, By to its left and Bz up, shape
+            (3, 3).
         sigma_m: Standard deviation of the plane's distance, metres.
     """
 

@@ -81,7 +81,8 @@ class CameraConfig:
 class HeadConfig:
     """The camera on the PR2's head, and where the robot stands while it looks."""
 
-    # The base's x, y (metres) and heading (radians) in W; torso height; how far the head looks down.
+    # The base's x, y (metres) and heading (radians) in W; height of the torso; how far the head
+    # looks down.
     base_pose: list[float] = field(default_factory=lambda: [-1.0, -0.19, 0.0])
     torso_m: float = 0.15
     tilt_deg: float = 18.0

@@ -55,8 +55,8 @@ def find_goal(image: CameraImage, camera: CameraConfig, ball_radius_m: float) ->
     hue, saturation, value = np.moveaxis(rgb2hsv(image.color), -1, 0)
     yellow = (hue > YELLOW_HUE[0]) & (hue < YELLOW_HUE[1])
     yellow &= (saturation > YELLOW_SATURATION) & (value > YELLOW_VALUE)
-    spots = label(yellow)
-    regions = regionprops(spots)
+    spots = label(yellow)  # type: ignore[no-untyped-call]
+    regions = regionprops(spots)  # type: ignore[no-untyped-call]
     largest = max(regions, key=lambda region: region.area, default=None)
     num_pixels = 0 if largest is None else int(largest.area)
     if largest is None or num_pixels < MIN_PIXELS:

@@ -1,6 +1,6 @@
-"""What the cameras see of an environment: Drake's RGB-D sensors on the head and beside the foliage."""
+"""What the cameras see of an environment: Drake's RGB-D sensors."""
 
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context, DiagramBuilder
-from pydrake.systems.sensors import CameraInfo, RgbdSensor
+from pydrake.systems.sensors import CameraInfo, ImageDepth32F, ImageRgba8U, RgbdSensor
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.perception.config import CameraConfig, CamerasConfig, ExternalConfig
@@ -88,9 +88,7 @@ def take_views(instance: ClutterInstance, p_WG: Vector, cameras: CamerasConfig) 
     )
     for name, sensor in (("head", head_sensor), ("external", external_sensor)):
         builder.AddNamedSystem(name, sensor)
-        builder.Connect(
-            scene_graph.get_query_output_port(), sensor.query_object_input_port()
-        )
+        builder.Connect(scene_graph.get_query_output_port(), sensor.query_object_input_port())
     diagram = builder.Build()
     root = diagram.CreateDefaultContext()
     plant_context = plant.GetMyMutableContextFromRoot(root)
@@ -116,7 +114,9 @@ def disturbed(views: Views, cameras: CamerasConfig, rng: np.random.Generator) ->
     )
 
 
-def _add_prop(scene_graph: SceneGraph, name: str, shape: Shape, p_WO: Vector, color: Vector) -> None:
+def _add_prop(
+    scene_graph: SceneGraph, name: str, shape: Shape, p_WO: Vector, color: Vector
+) -> None:
     """Adds a thing that only cameras notice."""
     source = scene_graph.RegisterSource(name)
     geometry = scene_graph.RegisterAnchoredGeometry(
@@ -168,8 +168,10 @@ def _read(
 ) -> CameraImage:
     context = sensor.GetMyContextFromRoot(root)
     # Copies: what Drake returns may be a view of its own memory.
-    color = np.array(sensor.color_image_output_port().Eval(context).data[..., :3])
-    depth = np.array(sensor.depth_image_32F_output_port().Eval(context).data[..., 0], dtype=float)
+    rgba = cast(ImageRgba8U, sensor.color_image_output_port().Eval(context))
+    image = cast(ImageDepth32F, sensor.depth_image_32F_output_port().Eval(context))
+    color = np.array(np.asarray(rgba.data)[..., :3])
+    depth = np.array(np.asarray(image.data)[..., 0], dtype=np.float64)
     depth[~np.isfinite(depth) | (depth <= 0.0)] = np.nan
     return CameraImage(
         color=color,

@@ -128,9 +128,10 @@ def add_scene(
 
     Movable objects only translate, in the ground plane or, floating, in space: the friction torque
     of the authors' planar objects is larger than any contact torque, so they never spin. See
-    `lic_drake.scene.movables` for what resists them. Stems bend at their roots. Unless `visuals`, the objects cannot be seen,
-    which saves a quarter of the time that building takes. With `base_slides` the arm's base has two
-    positions, x and y, for drawings of a robot that moves between reaches; nothing drives it.
+    `lic_drake.scene.movables` for what resists them. Stems bend at their roots. Unless `visuals`,
+    the objects cannot be seen, which saves a quarter of the time that building takes. With
+    `base_slides` the arm's base has two positions, x and y, for drawings of a robot that moves
+    between reaches; nothing drives it.
     """
     plant, scene_graph = AddMultibodyPlant(
         MultibodyPlantConfig(
