@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from matplotlib.figure import Figure
-from skimage.io import imsave
+from matplotlib.image import imsave
 
 from lic_drake.evaluate.perception_errors import board_of
 from lic_drake.evaluate.plots import save_figure
@@ -39,8 +39,8 @@ def main() -> int:
     apertures = find_apertures(views.head, cameras.head.camera, board)
     goal = find_goal(views.external, cameras.external.camera, cameras.ball_radius_m)
     args.results.mkdir(parents=True, exist_ok=True)
-    imsave(args.results / "head.jpg", views.head.color, quality=85)
-    imsave(args.results / "external.jpg", views.external.color, quality=85)
+    imsave(args.results / "head.jpg", views.head.color)
+    imsave(args.results / "external.jpg", views.external.color)
     figure = Figure(figsize=(10.0, 4.0), layout="constrained")
     left, right = figure.subplots(1, 2)
     draw_apertures(left, views.head, apertures).set_title("probability of being open", fontsize=9)

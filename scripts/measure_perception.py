@@ -2,8 +2,8 @@
 
     python scripts/measure_perception.py notebooks/results/perception
 
-Writes perception.md, apertures.parquet and goals.parquet. The scenes are environments of the
-evaluation stream; nothing was tried out on them.
+Writes perception.md, apertures.parquet and goals.parquet; what is there already is not measured
+again. The scenes are environments of the evaluation stream; nothing was tried out on them.
 """
 
 import argparse
@@ -54,6 +54,11 @@ def save(
     return text
 
 
+def load[Row: (ApertureError, GoalError)](path: Path, kind: type[Row]) -> list[Row]:
+    """Returns the rows of an earlier run, which is taken up again."""
+    return [kind(**row) for row in pq.read_table(path).to_pylist()] if path.is_file() else []
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("results", type=Path, help="folder for the results")
@@ -64,9 +69,10 @@ def main() -> int:
     if args.scenes < 1:
         parser.error(f"--scenes must be at least 1, got {args.scenes}")
     scenario, cameras = load_scenario(args.scenario), load_cameras(args.cameras)
-    apertures: list[ApertureError] = []
-    goals: list[GoalError] = []
-    for scene in tqdm(range(args.scenes), unit="scene"):
+    apertures = load(args.results / "apertures.parquet", ApertureError)
+    goals = load(args.results / "goals.parquet", GoalError)
+    text = perception_report(apertures, goals) if goals else ""
+    for scene in tqdm(range(len(goals) // 2, args.scenes), unit="scene"):
         of_board, of_goal = measure_scene(scenario, cameras, scene)
         apertures += of_board
         goals += of_goal

@@ -23,6 +23,10 @@ YELLOW_VALUE = 0.25
 MIN_PIXELS = 20
 """A smaller spot is not taken for the ball."""
 
+RIM = 0.2
+"""Pixels in which rays pass nearer to a ball's rim than this share of radius^2 do not count for the
+covariance."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class DetectedGoal:
@@ -94,13 +98,21 @@ def _fit_ball(
     middle = np.median(rays * depth[:, np.newaxis], axis=0)
     first = middle * (1.0 + radius_m / np.linalg.norm(middle))
     fit = least_squares(residuals, first, loss="soft_l1", f_scale=2.0)
-    return fit.x, np.linalg.inv(fit.jac.T @ fit.jac)
+    # Towards its rim the ball's depth changes ever faster, and at last means nothing.
+    jacobian = fit.jac[_inside(rays, fit.x, radius_m) > RIM * radius_m**2 * np.sum(rays**2, axis=1)]
+    return fit.x, np.linalg.inv(jacobian.T @ jacobian)
+
+
+def _inside(rays: Vector, p_CG: Vector, radius_m: float) -> Vector:
+    """Returns radius^2 - distance^2 of rays from a ball's centre, times the rays' length^2."""
+    inside: Vector = (rays @ p_CG) ** 2 - np.sum(rays**2, axis=1) * (p_CG @ p_CG - radius_m**2)
+    return inside
 
 
 def _disparity(rays: Vector, p_CG: Vector, radius_m: float) -> Vector:
     """Returns 1/z where rays meet a ball; beside it, where they pass nearest to it."""
     length2 = np.sum(rays * rays, axis=1)
     along = rays @ p_CG
-    inside = along**2 - length2 * (p_CG @ p_CG - radius_m**2)
+    inside = _inside(rays, p_CG, radius_m)
     disparity: Vector = length2 / (along - np.sqrt(np.maximum(inside, 0.0)))
     return disparity

@@ -17,6 +17,8 @@ from lic_drake.perception.image import CameraImage
 
 Vector = NDArray[np.float64]
 
+_FAR_M = 1e6
+
 
 def add_depth_noise(depth: Vector, config: NoiseConfig, rng: np.random.Generator) -> Vector:
     """Returns what a depth camera would measure.
@@ -32,7 +34,7 @@ def add_depth_noise(depth: Vector, config: NoiseConfig, rng: np.random.Generator
     if config.depth_step_per_m > 0.0:
         # A step of the disparity 1/z is everywhere the same one.
         disparity = config.depth_step_per_m * np.round(disparity / config.depth_step_per_m)
-    known = np.nan_to_num(depth, nan=np.inf)
+    known = np.nan_to_num(depth, nan=_FAR_M)
     jump = maximum_filter(known, 3) - minimum_filter(known, 3) > config.jump_m
     lost = rng.random(depth.shape) < np.where(jump, config.edge_dropout, config.dropout)
     measured: Vector = np.where(lost | ~(disparity > 0.0), np.nan, 1.0 / np.abs(disparity))

@@ -4,13 +4,15 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+from pydrake.common import MemoryFile
 from pydrake.geometry import (
     Box,
     CollisionFilterDeclaration,
-    Convex,
     Cylinder,
     GeometryId,
     GeometrySet,
+    InMemoryMesh,
+    Mesh,
     ProximityProperties,
     SceneGraph,
 )
@@ -31,6 +33,9 @@ from lic_drake.scene.looks import BRANCH_COLOR, LEAF_COLORS, STEM_COLOR
 from lic_drake.scene.movables import CARRIAGE_SHARE
 
 Vector = NDArray[np.float64]
+
+_RIM_POINTS = 12
+"""Corners of a leaf as it is drawn."""
 
 
 def add_stems(
@@ -76,9 +81,15 @@ def add_stems(
         )
         if visuals:
             color = BRANCH_COLOR if stems.fixed[i] else STEM_COLOR
-            plant.RegisterVisualGeometry(
-                body, _root_in_body(stems, i) @ X_SO, shape, f"stem{i}_visual", color
-            )
+            X_BS = _root_in_body(stems, i)
+            plant.RegisterVisualGeometry(body, X_BS @ X_SO, shape, f"stem{i}_visual", color)
+            for k, leaf_color in enumerate(LEAF_COLORS):
+                leaves = np.flatnonzero(stems.leaf_stem == i)[k :: len(LEAF_COLORS)]
+                if len(leaves):
+                    mesh = _leaf_mesh(stems, leaves)
+                    plant.RegisterVisualGeometry(
+                        body, X_BS, mesh, f"stem{i}_leaves{k}_visual", leaf_color
+                    )
     for j, i in enumerate(stems.leaf_stem):
         X_SL = RigidTransform(RotationMatrix(stems.R_SL[j]), stems.p_SL[j])
         X_BL = _root_in_body(stems, i) @ X_SL
@@ -87,14 +98,6 @@ def add_stems(
                 bodies[i], X_BL, Box(stems.leaf_size[j]), f"leaf{j}_collision", properties()
             )
         )
-        if visuals:
-            plant.RegisterVisualGeometry(
-                bodies[i],
-                X_BL,
-                _leaf_shape(stems.leaf_size[j]),
-                f"leaf{j}_visual",
-                LEAF_COLORS[j % len(LEAF_COLORS)],
-            )
     scene_graph.collision_filter_manager().Apply(
         CollisionFilterDeclaration().ExcludeWithin(GeometrySet(geometries))
     )
@@ -108,18 +111,32 @@ def _root_in_body(stems: Stems, i: int) -> RigidTransform:
     return RigidTransform()
 
 
-def _leaf_shape(size: Vector) -> Convex:
-    """Returns what a leaf looks like: an oval, pointed where it ends, within the plate's edges.
+def _leaf_mesh(stems: Stems, leaves: NDArray[np.intp]) -> Mesh:
+    """Returns what leaves of a stem look like, in its frame: ovals within the plates' edges.
 
-    As an ellipsoid every leaf would be drawn with thousands of triangles.
+    They are one mesh, because a renderer takes longer the more geometries there are.
     """
-    angle = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
-    along = np.cos(angle)
-    across = np.sin(angle) * (1.0 - 0.35 * np.maximum(along, 0.0))
-    rim = np.stack([along, across / np.abs(across).max(), np.zeros_like(angle)])
-    middle = np.array([[-0.1, -0.1], [0.0, 0.0], [1.0, -1.0]])
-    points = 0.5 * size[:, np.newaxis] * np.hstack([rim, middle])
-    return Convex(points, "leaf")
+    angle = np.linspace(0.0, 2.0 * np.pi, _RIM_POINTS, endpoint=False)
+    # Broadest before the middle, and with a ridge along it.
+    rim = np.stack([np.cos(angle), np.sin(angle) * (1.0 - 0.3 * np.cos(angle)), 0.0 * angle])
+    rim[1] /= rim[1].max()
+    ridge = np.array([[-0.1, -0.1], [0.0, 0.0], [1.0, -1.0]])
+    points = 0.5 * np.hstack([rim, ridge])
+    top, bottom = _RIM_POINTS, _RIM_POINTS + 1
+    sides = [(k, (k + 1) % _RIM_POINTS) for k in range(_RIM_POINTS)]
+    faces = [(a, b, top) for a, b in sides] + [(b, a, bottom) for a, b in sides]
+    vertices, normals, triangles = [], [], []
+    for j in leaves:
+        p_SQ = stems.p_SL[j] + (points.T * stems.leaf_size[j]) @ stems.R_SL[j].T
+        first = 1 + len(vertices)
+        vertices += ["v {:.6f} {:.6f} {:.6f}".format(*p) for p in p_SQ]
+        for a, b, c in faces:
+            normal = np.cross(p_SQ[b] - p_SQ[a], p_SQ[c] - p_SQ[a])
+            normals.append("vn {:.6f} {:.6f} {:.6f}".format(*normal / np.linalg.norm(normal)))
+            n = len(normals)
+            triangles.append(f"f {first + a}//{n} {first + b}//{n} {first + c}//{n}")
+    lines = vertices + normals + triangles
+    return Mesh(InMemoryMesh(mesh_file=MemoryFile("\n".join(lines) + "\n", ".obj", "leaves")))
 
 
 def _add_hinged_body(
