@@ -2,7 +2,7 @@
 
     python scripts/draw_perception.py notebooks/results/perception
 
-Writes head.jpg, external.jpg and detections.jpg.
+Writes head.png and external.png, without noise, and detections.jpg, with it.
 """
 
 import argparse
@@ -34,13 +34,14 @@ def main() -> int:
     instance = scenario.sample_instance("calibration", args.scene)
     p_WG = scenario.sample_goal("calibration", args.scene)
     rng = make_generator("calibration", "camera errors", args.scene)
-    views = disturbed(take_views(instance, p_WG, cameras), cameras, rng)
+    exact = take_views(instance, p_WG, cameras)
+    views = disturbed(exact, cameras, rng)
     _, board = board_of(scenario)
     apertures = find_apertures(views.head, cameras.head.camera, board)
     goal = find_goal(views.external, cameras.external.camera, cameras.ball_radius_m)
     args.results.mkdir(parents=True, exist_ok=True)
-    imsave(args.results / "head.jpg", views.head.color)
-    imsave(args.results / "external.jpg", views.external.color)
+    imsave(args.results / "head.png", exact.head.color)
+    imsave(args.results / "external.png", exact.external.color)
     figure = Figure(figsize=(10.0, 4.0), layout="constrained")
     left, right = figure.subplots(1, 2)
     draw_apertures(left, views.head, apertures).set_title("probability of being open", fontsize=9)

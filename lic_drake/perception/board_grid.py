@@ -194,7 +194,7 @@ def _refine(
     points: list[Vector] = []
     for axis, (found, count) in enumerate(zip(edges, counts, strict=True)):
         at = _to_board(guess, found[:, :2])
-        bars: Vector = aperture_m * (np.arange(count + 1) - 0.5 * count)
+        bars = aperture_m * (np.arange(count + 1, dtype=np.float64) - 0.5 * count)
         nearest = np.argmin(np.abs(at[:, axis, np.newaxis] - bars), axis=1)
         expected = _seen_edges(guess, bars[nearest], found[:, 2], eye, axis)
         off = at[:, axis] - expected

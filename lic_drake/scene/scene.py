@@ -172,6 +172,7 @@ def add_scene(
             clutter,
             instance.stems,
             partial(object_properties, config.contact),
+            objects,
             visuals,
         )
     plant.Finalize()

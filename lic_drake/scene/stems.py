@@ -1,6 +1,6 @@
 """Stems that bend away when they are pushed, with their leaves."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,13 +44,15 @@ def add_stems(
     clutter: ModelInstanceIndex,
     stems: Stems,
     properties: Callable[[], ProximityProperties],
+    objects: Sequence[GeometryId],
     visuals: bool = False,
 ) -> list[GeometryId]:
     """Adds stems, each on two joints across it at its root, and what they carry.
 
     The springs are actuators that want to be at 0: Drake integrates them implicitly. The
-    actuators' desired-state port must get zeros. Leaves move with their stem. Stems and leaves do
-    not touch each other: real leaves fold and slide past one another, rigid plates would jam.
+    actuators' desired-state port must get zeros. Leaves move with their stem. Stems and leaves
+    touch neither each other nor the objects in which they are rooted, only the robot: real leaves
+    fold and slide past one another, rigid plates would jam.
 
     Args:
         plant: The plant.
@@ -59,6 +61,7 @@ def add_stems(
             Sy of one springy stem after the other.
         stems: The stems.
         properties: Makes the contact properties of a stem or a leaf.
+        objects: Collision geometry of the environment's other objects.
         visuals: Whether they can be seen.
 
     Returns:
@@ -98,8 +101,11 @@ def add_stems(
                 bodies[i], X_BL, Box(stems.leaf_size[j]), f"leaf{j}_collision", properties()
             )
         )
+    grown = GeometrySet(geometries)
     scene_graph.collision_filter_manager().Apply(
-        CollisionFilterDeclaration().ExcludeWithin(GeometrySet(geometries))
+        CollisionFilterDeclaration()
+        .ExcludeWithin(grown)
+        .ExcludeBetween(grown, GeometrySet(objects))
     )
     return geometries
 
@@ -125,7 +131,9 @@ def _leaf_mesh(stems: Stems, leaves: NDArray[np.intp]) -> Mesh:
     top, bottom = _RIM_POINTS, _RIM_POINTS + 1
     sides = [(k, (k + 1) % _RIM_POINTS) for k in range(_RIM_POINTS)]
     faces = [(a, b, top) for a, b in sides] + [(b, a, bottom) for a, b in sides]
-    vertices, normals, triangles = [], [], []
+    vertices: list[str] = []
+    normals: list[str] = []
+    triangles: list[str] = []
     for j in leaves:
         p_SQ = stems.p_SL[j] + (points.T * stems.leaf_size[j]) @ stems.R_SL[j].T
         first = 1 + len(vertices)
