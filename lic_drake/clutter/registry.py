@@ -7,6 +7,7 @@ import numpy as np
 
 from lic_drake.clutter.aperture import CylinderApertureClutter
 from lic_drake.clutter.cylinder import CylinderClutter
+from lic_drake.clutter.foliage import FoliageApertureClutter
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.clutter.passage import PassageClutter
 from lic_drake.clutter.sphere import SphereApertureClutter
@@ -86,3 +87,4 @@ register_category("cylinder-clutter", CylinderClutter)
 register_category("passage-clutter", PassageClutter)
 register_category("cylinder-aperture-clutter", CylinderApertureClutter)
 register_category("sphere-aperture-clutter", SphereApertureClutter)
+register_category("foliage-aperture-clutter", FoliageApertureClutter)

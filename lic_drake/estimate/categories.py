@@ -75,3 +75,4 @@ register_features(
 )
 register_features("cylinder-aperture-clutter", PLANAR_LIC1, _FIRST_START)
 register_features("sphere-aperture-clutter", SPACE_LIC1, ("first_start_y", "first_start_z"))
+register_features("foliage-aperture-clutter", SPACE_LIC1, ("first_start_y", "first_start_z"))

@@ -14,7 +14,7 @@ from lic_drake.errors import LicError
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.robots.planar import PlanarArm
-from lic_drake.scene.scene import FIXED_COLOR, MOVABLE_COLOR
+from lic_drake.scene.looks import FIXED_COLOR, MOVABLE_COLOR
 
 Vector = NDArray[np.float64]
 

@@ -190,6 +190,20 @@ def parse_scenario(content: str, overrides: str = "", source: str = "scenario") 
     return scenario
 
 
+def read_section(schema: type[Any], content: str, source: str) -> Any:
+    """Reads YAML text into a dataclass; see `load_scenario` for what is refused.
+
+    Args:
+        schema: The dataclass; each field needs a default.
+        content: A YAML mapping of its fields.
+        source: Where the text comes from, for messages.
+
+    Raises:
+        ScenarioError: A key or value that does not fit.
+    """
+    return _typed(schema, _mapping(content, source), source)
+
+
 def _mapping(content: str, source: str) -> dict[str, Any]:
     """Parses YAML text that must be a mapping."""
     try:
