@@ -5,7 +5,7 @@ VENV := .venv
 PYTHON_IN_VENV := $(VENV)/bin/python
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo test lint tables evaluation clean
+.PHONY: setup demo test lint docs tables evaluation clean
 .DELETE_ON_ERROR:
 
 setup: $(STAMP)
@@ -20,6 +20,10 @@ lint: $(STAMP)
 	$(PYTHON_IN_VENV) -m ruff check .
 	$(PYTHON_IN_VENV) -m ruff format --check .
 	$(PYTHON_IN_VENV) -m mypy
+
+# Reference pages from the docstrings, out/docs/index.html; a warning is an error.
+docs: $(STAMP)
+	$(PYTHON_IN_VENV) -W error -m pdoc --docformat google --output-directory out/docs lic_drake
 
 # Tables I to IV, bounds and figures from the committed records, in seconds.
 tables: $(STAMP)

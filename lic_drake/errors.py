@@ -22,3 +22,18 @@ class LibraryError(LicError):
 
 class ClusterError(LicError):
     """A cluster cannot be reached, or its workers cannot be used as they are."""
+
+
+class RenderingError(LicError):
+    """Cameras cannot be simulated on this machine as it is."""
+
+
+class PerceptionError(LicError):
+    """What was looked for cannot be found in the images."""
+
+
+def quoted(value: object) -> str:
+    """Returns what a file says for a message: on one line, and not longer than is useful."""
+    text = str(value)
+    short = text if len(text) <= 40 else f"{text[:40]}..."
+    return short if short.isprintable() else ascii(short)

@@ -22,3 +22,8 @@ def scenarios_dir() -> Path:
 def shipped_library(category: str) -> Path:
     """Returns the folder of the experience library shipped for a clutter category."""
     return models_dir() / "experience" / category
+
+
+def shipped_libraries() -> list[Path]:
+    """Returns the folders of all shipped experience libraries, sorted by category."""
+    return sorted(path for path in (models_dir() / "experience").iterdir() if path.is_dir())

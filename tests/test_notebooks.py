@@ -1,10 +1,18 @@
-"""The notebooks run, from made-up records and from the committed ones, and hold no outputs."""
+"""The notebooks run, those of results from made-up records and from the committed ones.
 
+Notebooks of results are committed without outputs, because the records are; the others with small
+ones, as `python scripts/run_notebooks.py` leaves them.
+"""
+
+import re
+import resource
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import nbformat
 import pytest
+from browser import assert_shows_a_scene, visit
 from nbclient import NotebookClient
 from trial_rows import fill_records
 
@@ -12,6 +20,16 @@ from lic_drake.evaluate.paper import REMARKS, TABLES
 
 NOTEBOOKS = Path(__file__).resolve().parent.parent / "notebooks"
 NAMES = ["tables", "figures"]
+"""Notebooks of results."""
+
+TOURS = ["one_reach", "categories", "experience_library", "density_maps", "extend"]
+"""Notebooks that simulate, with the number of pictures and of recordings that they show."""
+
+PICTURES = dict(zip(TOURS, [2, 3, 1, 3, 1], strict=True))
+RECORDINGS = dict(zip(TOURS, [1, 0, 0, 1, 0], strict=True))
+
+MAX_NOTEBOOK_BYTES = 200_000
+MAX_SECONDS = 60.0
 RECORDS = [
     *(f"{category}/trials.parquet" for category in TABLES),
     "learning_curve/learning_curve.csv",
@@ -26,6 +44,9 @@ def read(name: str) -> nbformat.NotebookNode:
 def run(name: str, folder: Path) -> nbformat.NotebookNode:
     """Returns the notebook with the outputs it has when run in a folder."""
     notebook = read(name)
+    for cell in notebook.cells:
+        if cell.cell_type == "code":
+            cell.outputs = []
     NotebookClient(
         notebook, timeout=120, kernel_name="python3", resources={"metadata": {"path": folder}}
     ).execute()
@@ -45,7 +66,7 @@ def code(notebook: nbformat.NotebookNode) -> list[str]:
 
 
 def test_all_notebooks_are_tested() -> None:
-    assert {path.stem for path in NOTEBOOKS.glob("*.ipynb")} == set(NAMES)
+    assert {path.stem for path in NOTEBOOKS.glob("*.ipynb")} == {*NAMES, *TOURS}
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -55,7 +76,18 @@ def test_notebooks_are_committed_without_outputs(name: str) -> None:
         assert cell.get("execution_count") is None
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", TOURS)
+def test_tours_are_committed_with_small_outputs_of_every_cell_that_has_any(name: str) -> None:
+    assert (NOTEBOOKS / f"{name}.ipynb").stat().st_size < MAX_NOTEBOOK_BYTES
+    notebook = read(name)
+    assert len(list(outputs(notebook, "image/png"))) == PICTURES[name]
+    assert all(cell.execution_count for cell in notebook.cells if cell.cell_type == "code")
+    shown = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    assert not any(output.output_type == "error" for output in shown)
+    assert not any(place in str(shown) for place in ("/home/", "/work/", "/tmp/", "/root/"))
+
+
+@pytest.mark.parametrize("name", [*NAMES, *TOURS])
 def test_notebooks_hold_no_logic(name: str) -> None:
     assert not any(word in text for text in code(read(name)) for word in ("def ", "if ", "while "))
 
@@ -87,3 +119,34 @@ def test_notebooks_run_from_the_committed_records(name: str) -> None:
     if missing:
         pytest.skip(f"notebooks/results/{missing[0]} is not there yet")
     run(name, NOTEBOOKS)
+
+
+def wall_and_cpu_seconds() -> tuple[float, float]:
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.perf_counter(), usage.ru_utime + usage.ru_stime
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TOURS)
+def test_tours_run_in_less_than_a_minute_of_work(name: str) -> None:
+    began = wall_and_cpu_seconds()
+    notebook = run(name, NOTEBOOKS)
+    wall, cpu = (b - a for a, b in zip(began, wall_and_cpu_seconds(), strict=True))
+    # On a machine that is busy otherwise, waiting does not count.
+    assert min(wall, cpu) < MAX_SECONDS
+    assert len(list(outputs(notebook, "image/png"))) == PICTURES[name]
+    frames = [text for text in outputs(notebook, "text/html") if "<iframe" in text]
+    assert len(frames) == RECORDINGS[name]
+    for text in frames:
+        assert not re.search(r"(src|href)\s*=", text)
+
+
+@pytest.mark.slow
+@pytest.mark.browser
+def test_a_notebook_s_recording_plays_in_a_browser(tmp_path: Path, chromium: str) -> None:
+    (frame,) = (t for t in outputs(run("one_reach", NOTEBOOKS), "text/html") if "<iframe" in t)
+    page = tmp_path / "output.html"
+    page.write_text(f"<!DOCTYPE html><body>{frame}</body>", encoding="utf-8")
+    image, console = visit(chromium, f"file://{page}", tmp_path)
+    assert console == []
+    assert_shows_a_scene(image[60:])

@@ -29,12 +29,13 @@ FLOW = (
     "experience",
     "estimate",
     "select",
+    "perception",
     "evaluate",
     "cli",
 )
 """Rooms from left to right; a module imports only from its own room and from rooms to its left."""
 
-IMPORT_NAMES = {"drake": "pydrake", "scikit-learn": "sklearn"}
+IMPORT_NAMES = {"drake": "pydrake", "scikit-image": "skimage", "scikit-learn": "sklearn"}
 BROUGHT_BY_DRAKE = {"matplotlib", "mpl_toolkits", "pydot", "yaml"}
 
 

@@ -2,8 +2,12 @@
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-type Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
+if TYPE_CHECKING:
+    type Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
+else:
+    Subparsers = argparse._SubParsersAction  # Takes no brackets where programs run.
 """What `add_parser` of a subcommand gets."""
 
 
@@ -52,7 +56,7 @@ def add_method_argument(parser: argparse.ArgumentParser) -> None:
         "--method",
         default="gp",
         metavar="NAME",
-        help="rnd, cost, knn, gp or gp-raw (default: %(default)s)",
+        help="strategy that selects: rnd, cost, knn, gp or gp-raw (default: %(default)s)",
     )
 
 
@@ -66,3 +70,8 @@ def add_library_argument(
         metavar="FOLDER",
         help=f"experience library (default: {default})",
     )
+
+
+def add_json_argument(parser: argparse.ArgumentParser) -> None:
+    """Adds --json, for output that a machine reads."""
+    parser.add_argument("--json", action="store_true", help="print one JSON object (default: text)")

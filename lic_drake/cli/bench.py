@@ -3,7 +3,12 @@
 import argparse
 import json
 
-from lic_drake.cli.arguments import Subparsers, add_scenario_arguments, positive_int
+from lic_drake.cli.arguments import (
+    Subparsers,
+    add_json_argument,
+    add_scenario_arguments,
+    positive_int,
+)
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -18,11 +23,13 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.add_argument("what", choices=["reach"], help="what to measure")
     add_scenario_arguments(parser)
     parser.add_argument(
-        "--reaches", type=positive_int, default=50, metavar="N", help="default: %(default)s"
+        "--reaches",
+        type=positive_int,
+        default=50,
+        metavar="N",
+        help="number of reaches to measure (default: %(default)s)",
     )
-    parser.add_argument(
-        "--json", action="store_true", help="print one JSON object (default: a few lines)"
-    )
+    add_json_argument(parser)
     parser.set_defaults(run=run)
 
 

@@ -1,6 +1,7 @@
 """`lic collect`: simulates the reaches of an experience library."""
 
 import argparse
+import json
 import math
 import multiprocessing
 import os
@@ -8,10 +9,10 @@ import shlex
 import sys
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 from lic_drake.cli import exit_codes
-from lic_drake.cli.arguments import Subparsers, positive_int
+from lic_drake.cli.arguments import Subparsers, add_json_argument, positive_int
 from lic_drake.cli.progress import ProgressDisplay
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from lic_drake.experience.grid import CollectionRequest
 
 DEFAULT_SCENARIO = "cylinder-clutter"
+"""Scenario of a new library when none is asked for."""
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -90,6 +92,7 @@ def add_parser(subparsers: Subparsers) -> None:
         type=int,
         help="use only N starts of the grid, evenly thinned (default: all)",
     )
+    add_json_argument(parser)
     parser.set_defaults(run=run)
 
 
@@ -111,12 +114,13 @@ def run(args: argparse.Namespace) -> int:
     print(
         f"{request.scenario.category}: {len(indices)} environments x {goals} goals x"
         f" {about}{starts} starts = {total} reaches into {args.library}",
+        file=_remarks(args),
         flush=True,
     )
     try:
         with ExitStack() as stack:
             where = _where(args, stack)
-            display = stack.enter_context(ProgressDisplay())
+            display = stack.enter_context(ProgressDisplay(_remarks(args)))
             report = collect(
                 ExperienceLibrary(args.library),
                 request,
@@ -133,7 +137,12 @@ def run(args: argparse.Namespace) -> int:
             file=sys.stderr,
         )
         return exit_codes.INTERRUPTED
-    return _conclude(report)
+    return _conclude(report, args)
+
+
+def _remarks(args: argparse.Namespace) -> TextIO:
+    """Returns where to print what is no part of the result."""
+    return sys.stderr if args.json else sys.stdout
 
 
 def _where(args: argparse.Namespace, stack: ExitStack) -> dict[str, Any]:
@@ -186,19 +195,32 @@ def _make_request(args: argparse.Namespace) -> "CollectionRequest":
     return CollectionRequest(**{**(vars(stored) if stored else {}), **values})
 
 
-def _conclude(report: "CollectionReport") -> int:
+def _conclude(report: "CollectionReport", args: argparse.Namespace) -> int:
     """Prints the result and returns the exit code."""
     from lic_drake.intervals import wilson_interval
 
     progress = report.progress
     low, high = wilson_interval(progress.successes, progress.done)
     rate = progress.successes / progress.done if progress.done else math.nan
-    print(
-        f"{progress.done} of {progress.total} reaches"
-        f" ({progress.done - progress.present} new in {progress.elapsed_s / 60.0:.1f} min);"
-        f" {progress.successes} successes: {rate:.1%}"
-        f" (90 % interval {low:.1%} to {high:.1%})"
-    )
+    if args.json:
+        values = {
+            "library": str(args.library),
+            "total": progress.total,
+            "done": progress.done,
+            "new": progress.done - progress.present,
+            "successes": progress.successes,
+            "success_interval": [low, high] if progress.done else None,
+            "elapsed_s": progress.elapsed_s,
+            "failed": {str(task.environment): task.reason for task in report.failed},
+        }
+        print(json.dumps(values))
+    else:
+        print(
+            f"{progress.done} of {progress.total} reaches"
+            f" ({progress.done - progress.present} new in {progress.elapsed_s / 60.0:.1f} min);"
+            f" {progress.successes} successes: {rate:.1%}"
+            f" (90 % interval {low:.1%} to {high:.1%})"
+        )
     for failed in report.failed:
         print(f"lic: environment {failed.environment} failed: {failed.reason}", file=sys.stderr)
     if progress.done < progress.total:

@@ -1,10 +1,17 @@
 """`lic evaluate`: compares strategies on unseen environments."""
 
 import argparse
+import json
 import os
+import sys
 from pathlib import Path
 
-from lic_drake.cli.arguments import Subparsers, add_library_argument, positive_int
+from lic_drake.cli.arguments import (
+    Subparsers,
+    add_json_argument,
+    add_library_argument,
+    positive_int,
+)
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -87,13 +94,14 @@ def add_parser(subparsers: Subparsers) -> None:
         help="name of these trials beside others in the same folder (default: none)",
     )
     add_library_argument(parser)
+    add_json_argument(parser)
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Runs the subcommand and returns the exit code."""
     from lic_drake.evaluate.experiment import Evaluation, run_evaluation
-    from lic_drake.evaluate.rates import format_rates, summarize_trials
+    from lic_drake.evaluate.rates import format_rates, rates_to_dicts, summarize_trials
     from lic_drake.evaluate.trials import TrialTable
     from lic_drake.paths import shipped_library
 
@@ -112,6 +120,13 @@ def run(args: argparse.Namespace) -> int:
         overrides=args.set,
         moves=not args.still,
     )
-    table = TrialTable(run_evaluation(evaluation, args.workers))
-    print(format_rates(summarize_trials(table, args.attempts, args.variant)), end="")
+    remarks = sys.stderr if args.json else sys.stdout
+    rows = run_evaluation(
+        evaluation, args.workers, say=lambda line: print(line, file=remarks, flush=True)
+    )
+    rates = summarize_trials(TrialTable(rows), args.attempts, args.variant)
+    if args.json:
+        print(json.dumps({"trials": str(evaluation.trials_path), "rates": rates_to_dicts(rates)}))
+    else:
+        print(format_rates(rates), end="")
     return 0

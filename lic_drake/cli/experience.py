@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lic_drake.cli import exit_codes
-from lic_drake.cli.arguments import Subparsers, positive_int
+from lic_drake.cli.arguments import Subparsers, add_json_argument, positive_int
 
 if TYPE_CHECKING:
     from lic_drake.experience.check import LibraryReport
@@ -42,7 +42,7 @@ def _add_info(actions: Subparsers) -> None:
         epilog="example: lic experience info out/cylinder --json",
     )
     _add_library(parser)
-    _add_json(parser)
+    add_json_argument(parser)
     parser.set_defaults(run=run_info)
 
 
@@ -61,7 +61,7 @@ def _add_check(actions: Subparsers) -> None:
         type=Path,
         help="collection request that the library must fulfil (default: the library's own)",
     )
-    _add_json(parser)
+    add_json_argument(parser)
     parser.set_defaults(run=run_check)
 
 
@@ -76,7 +76,11 @@ def _add_recompute(actions: Subparsers) -> None:
     )
     _add_library(parser)
     parser.add_argument(
-        "--rows", metavar="N", type=positive_int, default=100, help="default: %(default)s"
+        "--rows",
+        metavar="N",
+        type=positive_int,
+        default=100,
+        help="number of rows to simulate (default: %(default)s)",
     )
     parser.add_argument(
         "--seed", metavar="N", type=int, default=0, help="draws the rows (default: %(default)s)"
@@ -103,10 +107,6 @@ def _add_library(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "library", metavar="LIBRARY", type=Path, help="folder or .parquet file of the library"
     )
-
-
-def _add_json(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--json", action="store_true", help="print JSON (default: text)")
 
 
 def run_info(args: argparse.Namespace) -> int:

@@ -6,10 +6,21 @@ import sys
 from collections.abc import Sequence
 
 import lic_drake
-from lic_drake.cli import bench, collect, demo, evaluate, exit_codes, experience, reach, select
+from lic_drake.cli import (
+    bench,
+    collect,
+    demo,
+    evaluate,
+    exit_codes,
+    experience,
+    gallery,
+    reach,
+    select,
+)
+from lic_drake.cli.arguments import Subparsers
 from lic_drake.errors import LicError
 
-SUBCOMMANDS = (demo, reach, select, collect, experience, evaluate, bench)
+SUBCOMMANDS = (demo, reach, select, collect, experience, evaluate, gallery, bench)
 """Modules with `add_parser(subparsers)`, which sets `run(args) -> int` as a parser default."""
 
 
@@ -19,7 +30,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     Args:
         argv: Arguments without the program's name; those of the process by default.
     """
-    args = _make_parser().parse_args(argv)
+    args, unknown = make_parser().parse_known_args(argv)
+    if unknown:  # The subcommand's own parser knows what it takes.
+        args.parser.error(f"unrecognized arguments: {' '.join(unknown)}")
     try:
         code: int = args.run(args)
         sys.stdout.flush()
@@ -36,7 +49,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return exit_codes.BROKEN_PIPE
 
 
-def _make_parser() -> argparse.ArgumentParser:
+def make_parser() -> argparse.ArgumentParser:
+    """Returns the parser of the whole command line."""
     parser = argparse.ArgumentParser(
         prog="lic",
         description="Learning initial conditions for reaching into unknown clutter, on Drake.",
@@ -46,4 +60,14 @@ def _make_parser() -> argparse.ArgumentParser:
     subparsers = parser.add_subparsers(title="subcommands", metavar="SUBCOMMAND", required=True)
     for subcommand in SUBCOMMANDS:
         subcommand.add_parser(subparsers)
+    _name_parsers(subparsers)
     return parser
+
+
+def _name_parsers(subparsers: Subparsers) -> None:
+    """Lets parsed arguments know the parser of their subcommand."""
+    for parser in subparsers.choices.values():
+        parser.set_defaults(parser=parser)
+        for action in parser._actions:
+            if isinstance(action, argparse._SubParsersAction):
+                _name_parsers(action)

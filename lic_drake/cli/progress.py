@@ -1,6 +1,7 @@
 """How a collection shows its progress: a bar in a terminal, a line a minute in a log."""
 
-from typing import TYPE_CHECKING, Self
+import sys
+from typing import TYPE_CHECKING, Self, TextIO
 
 if TYPE_CHECKING:
     from lic_drake.experience.progress import Progress
@@ -10,15 +11,20 @@ LOG_EVERY_S = 60.0
 
 
 class ProgressDisplay:
-    """A context manager; `show` takes the progress as often as there is any."""
+    """A context manager; `show` takes the progress as often as there is any.
 
-    def __init__(self) -> None:
+    Args:
+        log: Where lines go when there is no terminal for a bar; by default the standard output.
+    """
+
+    def __init__(self, log: TextIO | None = None) -> None:
         from tqdm import tqdm
 
         # None: off where the output is no terminal.
         self._bar = tqdm(
             disable=None, bar_format="{percentage:3.0f}%|{bar}| {n_fmt}/{total_fmt}{postfix}"
         )
+        self._log = log
         self._next_line_s = LOG_EVERY_S
 
     def __enter__(self) -> Self:
@@ -33,7 +39,8 @@ class ProgressDisplay:
             self._bar.total, self._bar.n = progress.total, progress.done
             self._bar.set_postfix_str(_describe(progress))
         elif progress.elapsed_s >= self._next_line_s:
-            print(f"{progress.done}/{progress.total} reaches, {_describe(progress)}", flush=True)
+            line = f"{progress.done}/{progress.total} reaches, {_describe(progress)}"
+            print(line, file=self._log or sys.stdout, flush=True)
             self._next_line_s = progress.elapsed_s + LOG_EVERY_S
 
 

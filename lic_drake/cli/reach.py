@@ -26,10 +26,12 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--stream",
         default="evaluation",
-        help="seed stream of the environment (default: %(default)s)",
+        metavar="NAME",
+        help="seed stream of the environment: training, evaluation, calibration or holdout"
+        " (default: %(default)s)",
     )
     parser.add_argument(
-        "--environment", type=int, default=0, metavar="N", help="its index (default: 0)"
+        "--environment", type=int, default=0, metavar="N", help="its index in it (default: 0)"
     )
     parser.add_argument(
         "--goal",

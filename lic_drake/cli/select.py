@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from lic_drake.cli.arguments import (
     Subparsers,
+    add_json_argument,
     add_library_argument,
     add_method_argument,
     non_negative_int,
@@ -50,9 +51,7 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--seed", type=non_negative_int, default=0, metavar="N", help="for rnd (default: 0)"
     )
-    parser.add_argument(
-        "--json", action="store_true", help="print a JSON object (default: a sentence)"
-    )
+    add_json_argument(parser)
     parser.set_defaults(run=run)
 
 

@@ -1,15 +1,19 @@
-"""The known clutter categories. A new one is a new file and one line here."""
+"""The known clutter categories. A new one is a file of your own that calls `register_category`."""
 
+import dataclasses
 from typing import Protocol
 
 import numpy as np
 
 from lic_drake.clutter.aperture import CylinderApertureClutter
 from lic_drake.clutter.cylinder import CylinderClutter
+from lic_drake.clutter.foliage import FoliageApertureClutter
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.clutter.passage import PassageClutter
 from lic_drake.clutter.sphere import SphereApertureClutter
 from lic_drake.errors import ScenarioError
+from lic_drake.extensions import load_extensions
+from lic_drake.registration import add_entry
 
 
 class ClutterSampler(Protocol):
@@ -24,8 +28,41 @@ _CATEGORIES: dict[str, type[ClutterSampler]] = {}
 
 
 def register_category(name: str, sampler: type[ClutterSampler]) -> None:
-    """Makes a category known under `name`; `sampler` is a dataclass of its parameters."""
-    _CATEGORIES[name] = sampler
+    """Makes a category known under a name.
+
+    Its module must not say `from __future__ import annotations`: Drake's YAML reader needs the
+    types themselves.
+
+    Args:
+        name: What scenario files call it.
+        sampler: A dataclass of its parameters, each with a type and a default, with a method
+            `sample` that draws an environment.
+
+    Raises:
+        ScenarioError: The name is taken, or the class is not such a dataclass.
+    """
+    if not isinstance(sampler, type) or not dataclasses.is_dataclass(sampler):
+        raise ScenarioError(
+            f"the sampler of category {name!r} must be a dataclass of its parameters, got"
+            f" {sampler!r}; decorate the class with @dataclass(kw_only=True)"
+        )
+    if not callable(getattr(sampler, "sample", None)):
+        raise ScenarioError(
+            f"the sampler of category {name!r} has no method sample(rng); add one that returns a"
+            " ClutterInstance"
+        )
+    for item in dataclasses.fields(sampler):
+        if item.default is item.default_factory is dataclasses.MISSING:
+            raise ScenarioError(
+                f"the parameter {item.name!r} of category {name!r} has no default; give it one, so"
+                " that scenario files may leave it out"
+            )
+        if isinstance(item.type, str):
+            raise ScenarioError(
+                f"the parameter {item.name!r} of category {name!r} has a type in quotes; leave out"
+                " `from __future__ import annotations`, which scenario files cannot be read with"
+            )
+    add_entry(_CATEGORIES, "category", name, sampler, ScenarioError)
 
 
 def get_category(name: str) -> type[ClutterSampler]:
@@ -34,6 +71,7 @@ def get_category(name: str) -> type[ClutterSampler]:
     Raises:
         ScenarioError: The category is unknown.
     """
+    load_extensions()
     if name not in _CATEGORIES:
         raise ScenarioError(f"unknown category {name!r}; choose one of {', '.join(_CATEGORIES)}")
     return _CATEGORIES[name]
@@ -41,6 +79,7 @@ def get_category(name: str) -> type[ClutterSampler]:
 
 def category_names() -> tuple[str, ...]:
     """Returns the names of all known categories."""
+    load_extensions()
     return tuple(_CATEGORIES)
 
 
@@ -48,3 +87,4 @@ register_category("cylinder-clutter", CylinderClutter)
 register_category("passage-clutter", PassageClutter)
 register_category("cylinder-aperture-clutter", CylinderApertureClutter)
 register_category("sphere-aperture-clutter", SphereApertureClutter)
+register_category("foliage-aperture-clutter", FoliageApertureClutter)

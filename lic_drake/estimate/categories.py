@@ -1,12 +1,14 @@
 """What the robot knows before its first and second reach in each category (paper IV-A).
 
-A new category is one line here.
+A new category calls `register_features` beside `lic_drake.clutter.registry.register_category`.
 """
 
 from dataclasses import dataclass, replace
 
 from lic_drake.estimate.checks import EstimateError
 from lic_drake.estimate.features import PLANAR_LIC1, SPACE_LIC1, FeatureMap
+from lic_drake.extensions import load_extensions
+from lic_drake.registration import add_entry
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,16 +26,30 @@ class CategoryFeatures:
 
 _CATEGORIES: dict[str, CategoryFeatures] = {}
 
+# The paper's x0': in the plane a start is its place on the line and its direction.
+_FIRST_START = ("first_start_y", "first_start_phi")
 
-def register_category(name: str, first: FeatureMap, observed: tuple[str, ...]) -> None:
+
+def register_features(
+    name: str, first: FeatureMap = PLANAR_LIC1, observed: tuple[str, ...] = _FIRST_START
+) -> None:
     """Makes the features of a category known.
 
     Args:
         name: The clutter category.
-        first: Features of LIC-1.
-        observed: What LIC-2 has besides, see `FeatureMap.observed`.
+        first: Features of LIC-1; by default those of the plane.
+        observed: What LIC-2 has besides, see `FeatureMap.observed`; by default where the first
+            reach started.
+
+    Raises:
+        EstimateError: A feature is unknown, or the category has other features already.
     """
-    _CATEGORIES[name] = CategoryFeatures(first=first, second=replace(first, observed=observed))
+    features = CategoryFeatures(first=first, second=replace(first, observed=observed))
+    if _CATEGORIES.get(name, features) != features:
+        raise EstimateError(
+            f"the category {name!r} has other features already; choose another name for yours"
+        )
+    add_entry(_CATEGORIES, "category", name, features, EstimateError)
 
 
 def features_of(category: str) -> CategoryFeatures:
@@ -42,22 +58,21 @@ def features_of(category: str) -> CategoryFeatures:
     Raises:
         EstimateError: The category is unknown.
     """
+    load_extensions()
     if category not in _CATEGORIES:
         raise EstimateError(
             f"no features are known for the category {category!r}, only for"
-            f" {', '.join(_CATEGORIES)}; call register_category"
+            f" {', '.join(_CATEGORIES)}; call register_features"
         )
     return _CATEGORIES[category]
 
 
-# The paper's x0': in the plane a start is its place on the line and its direction.
-_FIRST_START = ("first_start_y", "first_start_phi")
-
-register_category(
+register_features(
     "cylinder-clutter", PLANAR_LIC1, (*_FIRST_START, "first_final_x", "first_final_y")
 )
-register_category(
+register_features(
     "passage-clutter", PLANAR_LIC1, (*_FIRST_START, "first_final_vx", "first_final_vy")
 )
-register_category("cylinder-aperture-clutter", PLANAR_LIC1, _FIRST_START)
-register_category("sphere-aperture-clutter", SPACE_LIC1, ("first_start_y", "first_start_z"))
+register_features("cylinder-aperture-clutter", PLANAR_LIC1, _FIRST_START)
+register_features("sphere-aperture-clutter", SPACE_LIC1, ("first_start_y", "first_start_z"))
+register_features("foliage-aperture-clutter", SPACE_LIC1, ("first_start_y", "first_start_z"))

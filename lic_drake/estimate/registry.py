@@ -1,4 +1,4 @@
-"""The known success estimators. A new one is a new file and one line here."""
+"""The known success estimators. A new one is a file of your own with `register_estimator`."""
 
 from collections.abc import Callable
 from functools import partial
@@ -10,15 +10,40 @@ from lic_drake.estimate.gaussian_process import GaussianProcess
 from lic_drake.estimate.local import LocalEstimator
 from lic_drake.estimate.local_process import choose_process
 from lic_drake.estimate.nearest_neighbours import NearestNeighbours
+from lic_drake.extensions import load_extensions
+from lic_drake.registration import add_entry
 
 EstimatorFactory = Callable[[FeatureMap], SuccessEstimator]
+"""Returns a new, unfitted estimator for what its features mean."""
 
 _ESTIMATORS: dict[str, EstimatorFactory] = {}
 
+_RESERVED = ("rnd", "cost")
+"""Methods of selection without an estimator."""
+
 
 def register_estimator(name: str, factory: EstimatorFactory) -> None:
-    """Makes an estimator known under `name`; `factory` returns a new, unfitted one."""
-    _ESTIMATORS[name] = factory
+    """Makes an estimator known under a name, which is then a method of selection, too.
+
+    Args:
+        name: What the command line calls it.
+        factory: Returns a new, unfitted one for a feature map; it satisfies `SuccessEstimator`.
+
+    Raises:
+        EstimateError: The name is taken or means another method, or `factory` cannot be called.
+    """
+    if not callable(factory):
+        raise EstimateError(
+            f"estimator {name!r} needs a function of a feature map that returns it, got"
+            f" {factory!r}; register the class or a lambda, not the estimator"
+        )
+    twins = (f"{name}1", name[:-1] if name.endswith("1") else None)
+    if name in _RESERVED or any(twin in _ESTIMATORS for twin in twins):
+        raise EstimateError(
+            f"{name!r} cannot be the name of an estimator, as it would mean two methods; choose"
+            " another name"
+        )
+    add_entry(_ESTIMATORS, "estimator", name, factory, EstimateError)
 
 
 def make_estimator(name: str, features: FeatureMap = PLANAR_LIC1) -> SuccessEstimator:
@@ -31,6 +56,7 @@ def make_estimator(name: str, features: FeatureMap = PLANAR_LIC1) -> SuccessEsti
     Raises:
         EstimateError: The estimator is unknown.
     """
+    load_extensions()
     if name not in _ESTIMATORS:
         raise EstimateError(
             f"unknown estimator {name!r}; choose one of {', '.join(estimator_names())}"
@@ -40,6 +66,7 @@ def make_estimator(name: str, features: FeatureMap = PLANAR_LIC1) -> SuccessEsti
 
 def estimator_names() -> tuple[str, ...]:
     """Returns the names of all known estimators, the default first."""
+    load_extensions()
     return tuple(_ESTIMATORS)
 
 

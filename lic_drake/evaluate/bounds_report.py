@@ -28,6 +28,7 @@ from lic_drake.select.registry import fit_model
 Vector = NDArray[np.float64]
 
 APERTURES = "cylinder-aperture-clutter"
+"""The category whose base moves."""
 
 LEARNED = ("gp", "knn")
 """Estimators of LIC-1 in the tables."""

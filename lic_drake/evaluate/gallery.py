@@ -175,6 +175,6 @@ def _read_calibration(path: Path) -> dict[str, list[CalibrationBin]]:
             f"no calibration curves at {path}; make them with: python scripts/cross_validate.py"
             f" models/experience/cylinder-clutter --out {path.parent}"
         ) from None
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, csv.Error) as error:
         raise LibraryError(f"{path} has no calibration curves ({error}); make it again") from None
     return curves

@@ -118,6 +118,6 @@ def read_learning_curves(path: Path) -> dict[str, list[LearningPoint]]:
         raise LibraryError(
             f"no learning curve at {path}; make it with: python scripts/learning_curve.py"
         ) from None
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, csv.Error) as error:
         raise LibraryError(f"{path} is no learning curve ({error}); make it again") from None
     return curves

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
 Successes = NDArray[np.bool_]
+"""Array that tells which reaches arrived at their goal."""
 
 BANDWIDTHS_M = tuple(float(h) for h in np.geomspace(0.002, 0.4, 24))
 """Widths of the kernel over goals to choose from, metres."""

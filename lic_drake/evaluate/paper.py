@@ -82,6 +82,7 @@ TABLE_I = PaperTable(
         ),
     },
 )
+"""Success in cylinder-clutter."""
 
 TABLE_III = PaperTable(
     number="III",
@@ -114,6 +115,7 @@ TABLE_III = PaperTable(
         ),
     },
 )
+"""Success in passage-clutter."""
 
 TABLE_IV = PaperTable(
     number="IV",
@@ -140,6 +142,7 @@ TABLE_IV = PaperTable(
         ),
     },
 )
+"""Success in cylinder-aperture-clutter."""
 
 TABLES = {table.category: table for table in (TABLE_I, TABLE_III, TABLE_IV)}
 """Success rates by clutter category."""

@@ -14,11 +14,12 @@ from lic_drake.errors import LicError
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.robots.planar import PlanarArm
-from lic_drake.scene.scene import FIXED_COLOR, MOVABLE_COLOR
+from lic_drake.scene.looks import FIXED_COLOR, MOVABLE_COLOR
 
 Vector = NDArray[np.float64]
 
 ATTEMPT_COLORS = ("tab:blue", "tab:purple", "tab:green", "tab:olive", "tab:cyan")
+"""Colours of the first and further attempts, over and over again."""
 
 
 def draw_density(

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from lic_drake.evaluate.statistics import Count, count, mcnemar
 from lic_drake.evaluate.trials import TrialTable
@@ -35,6 +36,21 @@ def summarize_trials(table: TrialTable, attempts: int, variant: str = "") -> lis
             p = mcnemar(won[method], won["rnd"]) if compared else float("nan")
             rates.append(Rate(method=method, attempts=number, count=count(won[method]), p_value=p))
     return rates
+
+
+def rates_to_dicts(rates: Sequence[Rate]) -> list[dict[str, Any]]:
+    """Returns the rates as plain data for JSON; a test that was not made is None."""
+    return [
+        {
+            "method": rate.method,
+            "attempts": rate.attempts,
+            "successes": rate.count.successes,
+            "trials": rate.count.trials,
+            "interval": list(rate.count.interval()),
+            "p_value": None if rate.p_value != rate.p_value else rate.p_value,
+        }
+        for rate in rates
+    ]
 
 
 def format_rates(rates: Sequence[Rate]) -> str:

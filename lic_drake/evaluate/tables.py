@@ -16,8 +16,11 @@ from lic_drake.evaluate.table import Table
 from lic_drake.evaluate.trials import TrialTable
 
 BASELINES = ("rnd", "cost")
+"""The paper's strategies that learn nothing."""
 LEARNED = ("gp", "knn")
+"""The paper's strategies that learn, by their estimators."""
 METHODS = (*BASELINES, *LEARNED)
+"""The paper's strategies in the order of its tables."""
 
 _PARTS = ("1st attempt", "2nd attempt", "total")
 

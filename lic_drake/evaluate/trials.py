@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 import lic_drake
-from lic_drake.errors import LibraryError
+from lic_drake.errors import LibraryError, quoted
 from lic_drake.evaluate.statistics import Count
 from lic_drake.experience.files import readable_errors, write_atomically
 
@@ -116,7 +116,7 @@ def _check(path: Path, schema: pa.Schema) -> None:
         raise LibraryError(f"{path} holds no trials of lic_drake; choose another file")
     if version != str(VERSION).encode() or not schema.equals(SCHEMA, check_metadata=False):
         raise LibraryError(
-            f"{path} holds trials of version {version.decode(errors='replace')} that this"
+            f"{path} holds trials of version {quoted(version.decode(errors='replace'))} that this"
             f" lic_drake {lic_drake.__version__} cannot read; evaluate again"
         )
 

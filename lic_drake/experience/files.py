@@ -26,6 +26,19 @@ def readable_errors(path: Path, action: str) -> Iterator[None]:
         ) from error
 
 
+def check_writable(folder: Path) -> None:
+    """Makes a folder and sees that files can be written there, before any work starts.
+
+    Raises:
+        LibraryError: The system refuses.
+    """
+    with readable_errors(folder, "write into"):
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / ".write-test"
+        probe.touch()
+        probe.unlink()
+
+
 def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
     """Writes a file so that readers see the old one, or the new one, and never half of it.
 

@@ -20,6 +20,7 @@ from lic_drake.reach.request import ReachRequest, make_request
 from lic_drake.reach.scenario import Scenario, parse_scenario
 from lic_drake.reach.starts import training_starts
 from lic_drake.seeds import STREAMS
+from lic_drake.yaml_text import parse_yaml
 
 REQUEST_FILE = "_collection.yaml"
 """Name of the request's file in a library; the underscore hides it from Parquet readers."""
@@ -165,8 +166,8 @@ def read_request(path: Path) -> CollectionRequest:
     with readable_errors(path, "read"):
         content = path.read_bytes()
     try:
-        data = yaml.safe_load(content)
-    except (yaml.YAMLError, UnicodeDecodeError):
+        data = parse_yaml(content)
+    except ValueError:
         data = None
     if not isinstance(data, dict) or not _is_request(data):
         raise LibraryError(

@@ -10,6 +10,7 @@ from lic_drake.experience.schema import FIELDS, TUPLES
 from lic_drake.reach.request import ReachRecord
 
 SUFFIX = ".partial.jsonl"
+"""End of a journal's file name."""
 
 _SUCCESS = b'"success": true'
 
@@ -125,9 +126,35 @@ def _parse_line(line: bytes) -> ReachRecord | None:
         data: dict[str, Any] = json.loads(line)
         for name in TUPLES:
             data[name] = tuple(data[name])
-        return ReachRecord(**data) if list(data) == list(FIELDS) else None
-    except (ValueError, TypeError, KeyError):
+        if list(data) != list(FIELDS) or not all(map(_fits, data.values(), FIELDS.values())):
+            return None
+        return ReachRecord(**data)
+    except (ValueError, TypeError, KeyError, RecursionError):
         return None
+
+
+def _fits(value: object, kind: object) -> bool:
+    """Tells whether a value that JSON gave may stand in a column of a Python type."""
+    if kind is float:  # JSON has one kind of number; true is none.
+        return type(value) is float or (type(value) is int and abs(value) < 2**53)
+    if kind is int:
+        return type(value) is int and -(2**63) <= value < 2**63
+    if kind is str:
+        return _is_text(value)
+    if kind is bool:
+        return type(value) is bool
+    return type(value) is tuple and all(_fits(item, float) for item in value)
+
+
+def _is_text(value: object) -> bool:
+    """Tells whether a value is text that files can hold; JSON also has halves of characters."""
+    if not isinstance(value, str):
+        return False
+    try:
+        value.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def journal_paths(library: Path) -> list[Path]:

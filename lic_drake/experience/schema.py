@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 import yaml
 
 import lic_drake
-from lic_drake.errors import LibraryError
+from lic_drake.errors import LibraryError, quoted
 from lic_drake.reach.request import ReachRecord
 from lic_drake.reach.scenario import Scenario, to_dict
 
@@ -195,17 +195,18 @@ def _check_schema(path: Path, schema: pa.Schema) -> TableHeader:
         ) from None
     if not 1 <= header.schema_version <= SCHEMA_VERSION:
         raise LibraryError(
-            f"{path} has schema version {header.schema_version}, written by lic_drake"
-            f" {header.lic_drake_version}; this lic_drake {lic_drake.__version__} reads versions up"
-            f" to {SCHEMA_VERSION}: use that lic_drake, or collect the library again"
+            f"{path} has schema version {quoted(header.schema_version)}, written by lic_drake"
+            f" {quoted(header.lic_drake_version)}; this lic_drake {lic_drake.__version__} reads"
+            f" versions up to {SCHEMA_VERSION}: use that lic_drake, or collect the library again"
         )
     expected = schema_of(header.schema_version)
     if not schema.equals(expected, check_metadata=False):
         odd = sorted(set(expected.names) ^ set(schema.names)) or [
-            name for name in expected.names if schema.field(name).type != expected.field(name).type
+            mine.name for mine, theirs in zip(expected, schema, strict=False) if mine != theirs
         ]
+        names = ", ".join(map(quoted, odd[:5])) or "some twice"
         raise LibraryError(
-            f"{path} has other columns than this lic_drake writes ({', '.join(odd) or 'order'});"
+            f"{path} has other columns than this lic_drake writes ({names});"
             " delete it and collect its reaches again"
         )
     return header

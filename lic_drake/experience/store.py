@@ -1,5 +1,6 @@
 """`ExperienceLibrary`: the library D of the paper (III-A) as a folder of Parquet shards."""
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -7,7 +8,7 @@ from typing import Any
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from lic_drake.errors import LibraryError
+from lic_drake.errors import LibraryError, quoted
 from lic_drake.experience.files import readable_errors, write_atomically
 from lic_drake.experience.schema import (
     TableHeader,
@@ -22,6 +23,7 @@ from lic_drake.reach.request import ReachRecord
 from lic_drake.reach.scenario import Scenario, parse_scenario
 
 SUFFIX = ".parquet"
+"""End of a shard's file name."""
 
 COMPACTED = "reaches"
 """Name of the shard that holds all rows after `ExperienceLibrary.compact`."""
@@ -100,7 +102,15 @@ class ExperienceLibrary:
             LibraryError: As `header`.
             ScenarioError: This lic_drake does not know the scenario's category or parameters.
         """
-        return parse_scenario(self.header().scenario, source=str(self.path))
+        header = self.header()
+        scenario = parse_scenario(header.scenario, source=str(self.path))
+        if scenario.digest != header.scenario_digest:
+            raise LibraryError(
+                f"{self.path}: its scenario has digest {scenario.digest}, its reaches were made"
+                f" with {quoted(header.scenario_digest)}: the file was edited, or another lic_drake"
+                " wrote it; use that lic_drake, or collect the library again"
+            )
+        return scenario
 
     def table(self) -> pa.Table:
         """Returns all rows, sorted by shard.
@@ -151,7 +161,7 @@ class ExperienceLibrary:
             LibraryError: The folder cannot be written (permission, disk full), or a record
                 belongs to another scenario.
         """
-        if not name or Path(name).name != name or name.startswith((".", "_")):
+        if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,200}", name):
             raise LibraryError(f"{name!r} cannot be a shard's name; use letters and digits")
         header = make_header(scenario)
         others = {record.scenario for record in records} - {header.scenario_digest}

@@ -6,6 +6,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from lic_drake.clutter.board import ApertureBoard
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import ScenarioError
 from lic_drake.reach.initial_conditions import InitialConditions
@@ -63,8 +64,8 @@ class PointingStarts:
 
     @cached_property
     def _bare_board(self) -> ClutterInstance:
-        bare: ClutterInstance = self.scenario.clutter.bare_board()  # type: ignore[attr-defined]
-        return bare
+        assert isinstance(self.scenario.clutter, ApertureBoard)
+        return self.scenario.clutter.bare_board()
 
     @cached_property
     def checker(self) -> CollisionChecker:
@@ -139,7 +140,7 @@ def pointing_starts(
     if (
         not isinstance(scenario.arm(), Pr2Arm)
         or instance.p_WA is None
-        or not hasattr(scenario.clutter, "bare_board")
+        or not isinstance(scenario.clutter, ApertureBoard)
     ):
         raise ScenarioError(
             "starts that point into apertures need the robot pr2 and a board of apertures;"

@@ -59,8 +59,8 @@ class MeshcatRecording:
         self._scenario = scenario
         self._meshcat = _make_meshcat()
         self._frames_per_second = frame_rate(scenario.mpc.rate_hz)
-        self._meshcat.SetProperty("/Background", "top_color", [0.97, 0.97, 0.98])
-        self._meshcat.SetProperty("/Background", "bottom_color", [0.97, 0.97, 0.98])
+        self._meshcat.SetProperty("/Background/<object>", "top_color", [0.97, 0.97, 0.98])
+        self._meshcat.SetProperty("/Background/<object>", "bottom_color", [0.97, 0.97, 0.98])
         self._meshcat.SetProperty("/Grid", "visible", False)
         self._meshcat.SetProperty("/Axes", "visible", False)
         self._meshcat.SetCameraPose(*_CAMERA[num_axes])

@@ -26,6 +26,7 @@ from lic_drake.robots.arm import Arm
 from lic_drake.robots.registry import get_robot
 from lic_drake.scene.scene import SceneConfig
 from lic_drake.seeds import make_generator
+from lic_drake.yaml_text import parse_yaml
 
 Vector = NDArray[np.float64]
 
@@ -128,7 +129,8 @@ def load_scenario(name_or_path: str | Path, overrides: str = "") -> Scenario:
     """
     path = Path(name_or_path)
     if path.suffix not in (".yaml", ".yml"):
-        path = scenarios_dir() / f"{name_or_path}.yaml"
+        # A name is no way out of the folder.
+        path = scenarios_dir() / f"{path.name}.yaml" if path.name == str(name_or_path) else Path()
     try:
         content = path.read_text(encoding="utf-8")
     except UnicodeDecodeError:
@@ -188,12 +190,26 @@ def parse_scenario(content: str, overrides: str = "", source: str = "scenario") 
     return scenario
 
 
+def read_section(schema: type[Any], content: str, source: str) -> Any:
+    """Reads YAML text into a dataclass; see `load_scenario` for what is refused.
+
+    Args:
+        schema: The dataclass; each field needs a default.
+        content: A YAML mapping of its fields.
+        source: Where the text comes from, for messages.
+
+    Raises:
+        ScenarioError: A key or value that does not fit.
+    """
+    return _typed(schema, _mapping(content, source), source)
+
+
 def _mapping(content: str, source: str) -> dict[str, Any]:
     """Parses YAML text that must be a mapping."""
     try:
-        data = yaml.safe_load(content) if content.strip() else {}
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise ScenarioError(f"{source}: not YAML: {' '.join(str(error).split())}") from None
+        data = parse_yaml(content) if content.strip() else {}
+    except ValueError as error:
+        raise ScenarioError(f"{source}: not YAML: {error}") from None
     if not isinstance(data, dict):
         raise ScenarioError(f"{source}: must be a YAML mapping, found {type(data).__name__}")
     return data

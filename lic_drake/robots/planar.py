@@ -1,4 +1,4 @@
-"""The three-link planar arm of the 2-D testbed (paper V-A), read from models/planar_arm.urdf."""
+"""Three-link planar arms: the one of the 2-D testbed (paper V-A), or any other description."""
 
 import math
 from functools import cache, lru_cache
@@ -18,6 +18,7 @@ from lic_drake.robots.planar_kinematics import PlanarArmKinematics
 from lic_drake.robots.skin_shape import SkinShape
 
 LINK_NAMES = ("link1", "link2", "link3")
+"""Names of the links in a description, proximal to distal."""
 
 _MOVES = np.tri(3)
 """1 where a joint (column) moves a link (row)."""
@@ -33,22 +34,58 @@ class _Pose(NamedTuple):
 
 
 class PlanarArm:
-    """Base welded at the world origin; joint impedance as implicit PD; satisfies `Arm`."""
+    """Base welded at the world origin; joint impedance as implicit PD; satisfies `Arm`.
 
-    name = "planar-arm"
+    Attributes:
+        name: Name in scenario files.
+        kinematics: Its kinematics in closed form.
+        damping: Joint damping of the impedance controller, shape (3,), Nms/rad.
+    """
+
     link_names: tuple[str, ...] = LINK_NAMES
     surface: tuple[SkinShape, ...] | None = None
 
-    def __init__(self) -> None:
+    def __init__(self, description: str | None = None, name: str = "planar-arm") -> None:
+        """Reads an arm.
+
+        Args:
+            description: URDF text, by default that of models/planar_arm.urdf. As there, the links
+                are base and link1 to link3, each of the latter with a collision capsule; three
+                joints with limits turn about +z; at zero the arm points along -y from the origin
+                of the base to the frame tip; each actuator has controller gains.
+            name: Name in scenario files.
+
+        Raises:
+            ScenarioError: The description cannot be read or describes another kind of arm.
+        """
+        self.name = name
+        self._description = description or (models_dir() / "planar_arm.urdf").read_text("utf-8")
         plant = MultibodyPlant(time_step=1e-3)
         scene_graph = SceneGraph()
         plant.RegisterAsSourceForSceneGraph(scene_graph)
+        try:
+            self._read(plant, scene_graph)
+        except (RuntimeError, ValueError) as error:
+            raise ScenarioError(
+                f"the description of {name} is not one of a planar arm: "
+                f"{' '.join(str(error).split())}; models/planar_arm.urdf shows how it must be"
+            ) from error
+
+    def _read(self, plant: MultibodyPlant, scene_graph: SceneGraph) -> None:
+        """Takes everything but the name from the description.
+
+        Raises:
+            RuntimeError: Drake cannot parse it, or misses something in it.
+            ValueError: It is not a planar arm as this class knows it.
+        """
         arm = self.add_to_plant(plant)
         plant.Finalize()
         context = plant.CreateDefaultContext()
 
         joints = [plant.get_joint(index) for index in plant.GetJointIndices(arm)]
         joints = [joint for joint in joints if joint.num_positions() == 1]
+        if len(joints) != 3 or plant.num_positions() != 3:
+            raise ValueError(f"it has {plant.num_positions()} degrees of freedom, not 3")
         tip = plant.GetFrameByName("tip", arm)
         frames = [joint.frame_on_parent() for joint in joints] + [tip]
         p_WJ = np.array([frame.CalcPoseInWorld(context).translation() for frame in frames])
@@ -62,10 +99,13 @@ class PlanarArm:
         self.p_RS = np.zeros(3)
         self.torso_m = 0.0
         self.reach_m = self.kinematics.reach_m
-        gains = [
-            plant.get_joint_actuator(index).get_controller_gains()
-            for index in plant.GetJointActuatorIndices(arm)
-        ]
+        if not np.all(np.isfinite([self.q_min, self.q_max])):
+            raise ValueError("a joint has no limits")
+        _check_kinematics(self.kinematics, plant, tip)
+        actuators = [plant.get_joint_actuator(i) for i in plant.GetJointActuatorIndices(arm)]
+        if len(actuators) != 3 or not all(a.has_controller() for a in actuators):
+            raise ValueError("it needs three actuators with controller gains")
+        gains = [actuator.get_controller_gains() for actuator in actuators]
         self.stiffness = np.array([gain.p for gain in gains])
         self.damping = np.array([gain.d for gain in gains])
         self.skin = tuple(_read_skin(plant, scene_graph, name) for name in LINK_NAMES)
@@ -77,7 +117,7 @@ class PlanarArm:
         self, plant: MultibodyPlant, parent: Frame | None = None
     ) -> ModelInstanceIndex:
         """Adds the arm without gravity, its base welded to a frame, else to the world's origin."""
-        (arm,) = Parser(plant).AddModels(str(models_dir() / "planar_arm.urdf"))
+        (arm,) = Parser(plant).AddModelsFromString(self._description, "urdf")
         plant.WeldFrames(parent or plant.world_frame(), plant.GetFrameByName("base", arm))
         plant.set_gravity_enabled(arm, False)
         return arm
@@ -152,10 +192,36 @@ class PlanarArm:
         return pose
 
 
+def _check_kinematics(kinematics: PlanarArmKinematics, plant: MultibodyPlant, tip: Frame) -> None:
+    """Sees that an arm turns as the closed form has it.
+
+    Raises:
+        ValueError: It does not.
+    """
+    q = np.array([0.3, 0.7, 1.1])
+    context = plant.CreateDefaultContext()
+    plant.SetPositions(context, q)
+    X_WE = tip.CalcPoseInWorld(context)
+    x, y, phi = kinematics.tip_pose(q)
+    direction = np.array([np.cos(phi), np.sin(phi), 0.0])
+    if not (
+        np.allclose(X_WE.translation(), [x, y, 0.0], atol=1e-6)
+        and np.allclose(X_WE.rotation().matrix()[:, 0], direction, atol=1e-6)
+    ):
+        raise ValueError(
+            f"at q = {q} rad its tip is at {np.round(X_WE.translation(), 4)} m with x along"
+            f" {np.round(X_WE.rotation().matrix()[:, 0], 4)}, where joints about +z and links along"
+            f" -y put it at [{x:.4f}, {y:.4f}, 0] with x along {np.round(direction, 4)}"
+        )
+
+
 def _read_skin(plant: MultibodyPlant, scene_graph: SceneGraph, link: str) -> SkinCapsule:
     """Returns the capsule of a link as the description gives it."""
     inspector = scene_graph.model_inspector()
-    (geometry,) = plant.GetCollisionGeometriesForBody(plant.GetBodyByName(link))
+    geometries = plant.GetCollisionGeometriesForBody(plant.GetBodyByName(link))
+    if len(geometries) != 1:
+        raise ValueError(f"{link}: the skin must be one capsule, found {len(geometries)} shapes")
+    (geometry,) = geometries
     shape = inspector.GetShape(geometry)
     if not isinstance(shape, Capsule):
         raise ValueError(f"{link}: the skin must be a capsule, found {type(shape).__name__}")

@@ -27,8 +27,11 @@ JOINTS = (
 """The joints of an arm, without side and suffix; each moves a link of its name."""
 
 BASE_JOINTS = ("x", "y", "theta")
+"""Joints of the mobile base."""
 TORSO_JOINT = "torso_lift_joint"
+"""Joint of the torso lift."""
 TOOL_FRAME = "r_gripper_tool_frame"
+"""Frame between the fingers of the right gripper."""
 
 SOFT_LIMITS = (
     (-2.1353981634, 0.5646018366),

@@ -1,6 +1,7 @@
 """Plant and scene graph from an arm, a clutter instance and a contact configuration."""
 
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,17 +30,15 @@ from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import ScenarioError
 from lic_drake.robots.arm import Arm
 from lic_drake.scene.contact import ContactConfig, object_properties, skin_properties
+from lic_drake.scene.looks import BASE_COLOR, object_color
 from lic_drake.scene.movables import add_floating_body, add_sliding_body
+from lic_drake.scene.stems import add_stems
 
 TIME_STEP_RANGE_S = (1e-5, 0.1)
 """Shortest and longest step of a discrete plant."""
 
 CONTACT_APPROXIMATIONS = ("sap", "similar", "lagged")
 """Drake's names for the ways in which a discrete plant solves contact."""
-
-FIXED_COLOR = np.array([0.55, 0.25, 0.20, 1.0])
-MOVABLE_COLOR = np.array([0.95, 0.70, 0.35, 1.0])
-BASE_COLOR = np.array([0.35, 0.38, 0.45, 1.0])
 
 
 @dataclass(kw_only=True)
@@ -103,7 +102,7 @@ class Scene:
         skin_links: Skin geometry -> index into the arm's link names.
         body: Collision geometry of the rest of the robot, which has no skin.
         objects: Collision geometry of each object of the instance.
-        num_axes: In how many directions its movable objects move.
+        num_axes: In how many directions its movable objects move, or its stems bend.
     """
 
     plant: MultibodyPlant
@@ -129,9 +128,10 @@ def add_scene(
 
     Movable objects only translate, in the ground plane or, floating, in space: the friction torque
     of the authors' planar objects is larger than any contact torque, so they never spin. See
-    `lic_drake.scene.movables` for what resists them. Unless `visuals`, the objects cannot be seen,
-    which saves a quarter of the time that building takes. With `base_slides` the arm's base has two
-    positions, x and y, for drawings of a robot that moves between reaches; nothing drives it.
+    `lic_drake.scene.movables` for what resists them. Stems bend at their roots. Unless `visuals`,
+    the objects cannot be seen, which saves a quarter of the time that building takes. With
+    `base_slides` the arm's base has two positions, x and y, for drawings of a robot that moves
+    between reaches; nothing drives it.
     """
     plant, scene_graph = AddMultibodyPlant(
         MultibodyPlantConfig(
@@ -157,13 +157,23 @@ def add_scene(
         else:
             body, X_BO = plant.world_body(), X_WO
         shape = make_shape(instance.shape[i], instance.size[i])
-        color = MOVABLE_COLOR if instance.movable[i] else FIXED_COLOR
         if visuals:
+            color = object_color(instance, i)
             plant.RegisterVisualGeometry(body, X_BO, shape, f"{name}_visual", color)
         objects.append(
             plant.RegisterCollisionGeometry(
                 body, X_BO, shape, f"{name}_collision", object_properties(config.contact)
             )
+        )
+    if instance.stems is not None:
+        add_stems(
+            plant,
+            scene_graph,
+            clutter,
+            instance.stems,
+            partial(object_properties, config.contact),
+            objects,
+            visuals,
         )
     plant.Finalize()
     return Scene(

@@ -56,18 +56,10 @@ def put_to_sleep(instance: ClutterInstance, spares: int) -> ClutterInstance:
         spares: Number of objects that can be awake at a time.
     """
     n, first = instance.num_objects, int(np.argmax(instance.movable))
-    pick = np.r_[np.arange(n), np.full(spares, first)]
-    p_WO = instance.p_WO[pick]
+    picked = instance.picked(np.r_[np.arange(n), np.full(spares, first)])
+    p_WO = picked.p_WO.copy()
     p_WO[n:, : instance.num_axes] = PARKING_M + np.arange(spares)[:, np.newaxis]
-    return replace(
-        instance,
-        shape=tuple(instance.shape[i] for i in pick),
-        size=instance.size[pick],
-        p_WO=p_WO,
-        yaw=instance.yaw[pick],
-        mass=instance.mass[pick],
-        movable=np.arange(n + spares) >= n,
-    )
+    return replace(picked, p_WO=p_WO, movable=np.arange(n + spares) >= n)
 
 
 class SkinAxes:

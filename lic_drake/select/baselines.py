@@ -14,8 +14,11 @@ from lic_drake.select.situation import Selection, Situation
 Vector = NDArray[np.float64]
 
 HAND_LENGTH_M = 0.288
+"""Length of the last link with the tip, metres."""
 HAND_RADIUS_M = 0.015
+"""Radius of its skin, metres."""
 OBJECT_RADIUS_M = 0.01
+"""Radius of a cylinder, metres."""
 
 PR2_HAND_LENGTH_M = 0.18
 PR2_HAND_RADIUS_M = 0.06

@@ -9,19 +9,6 @@ from lic_drake.cli import main as dut
 from lic_drake.cli.main import main
 from lic_drake.errors import LicError
 
-COMMANDS = [
-    ["demo"],
-    ["reach"],
-    ["select"],
-    ["evaluate"],
-    ["bench"],
-    ["collect"],
-    ["experience"],
-    ["experience", "info"],
-    ["experience", "check"],
-    ["experience", "merge"],
-]
-
 
 def _lic(*arguments: str) -> "subprocess.CompletedProcess[str]":
     return subprocess.run(
@@ -33,20 +20,6 @@ def test_python_m_lic_drake_is_the_command() -> None:
     result = _lic("--version")
     assert result.stdout == f"lic {lic_drake.__version__}\n"
     assert result.returncode == 0
-
-
-@pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
-def test_every_help_describes_itself_with_an_example(
-    command: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
-    with pytest.raises(SystemExit) as end:
-        main([*command, "--help"])
-    assert end.value.code == 0
-    text = " ".join(capsys.readouterr().out.split())
-    text, _, example = text.partition(" example: ")
-    assert example.startswith(f"lic {' '.join(command)}")
-    options = text.partition("options: -h, --help")[2].split(" --")[1:]
-    assert [option for option in options if "default: " not in option] == []
 
 
 def test_help_lists_every_subcommand(capsys: pytest.CaptureFixture[str]) -> None:

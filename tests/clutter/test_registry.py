@@ -7,6 +7,7 @@ import pytest
 from lic_drake.clutter import registry
 from lic_drake.clutter.aperture import CylinderApertureClutter
 from lic_drake.clutter.cylinder import CylinderClutter
+from lic_drake.clutter.foliage import FoliageApertureClutter
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.clutter.passage import PassageClutter
 from lic_drake.clutter.registry import category_names, get_category, register_category
@@ -46,6 +47,7 @@ def _restore(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         ("passage-clutter", PassageClutter),
         ("cylinder-aperture-clutter", CylinderApertureClutter),
         ("sphere-aperture-clutter", SphereApertureClutter),
+        ("foliage-aperture-clutter", FoliageApertureClutter),
     ],
 )
 def test_the_papers_categories_are_known(name: str, sampler: type) -> None:

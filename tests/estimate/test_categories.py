@@ -1,7 +1,7 @@
 import pytest
 
 from lic_drake.estimate import categories
-from lic_drake.estimate.categories import features_of, register_category
+from lic_drake.estimate.categories import features_of, register_features
 from lic_drake.estimate.checks import EstimateError
 from lic_drake.estimate.features import PLANAR_LIC1, SPACE_LIC1
 
@@ -38,10 +38,10 @@ def test_in_space_the_first_start_is_its_place_across_x() -> None:
 
 def test_a_category_can_be_added_by_one_call(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(categories, "_CATEGORIES", dict(categories._CATEGORIES))
-    register_category("foliage", PLANAR_LIC1, ("first_start_y",))
+    register_features("foliage", PLANAR_LIC1, ("first_start_y",))
     assert features_of("foliage").second.observed == ("first_start_y",)
 
 
 def test_an_unknown_category_is_named_with_the_known_ones() -> None:
-    with pytest.raises(EstimateError, match=r"'foliage'.*cylinder-clutter.*register_category"):
+    with pytest.raises(EstimateError, match=r"'foliage'.*cylinder-clutter.*register_features"):
         features_of("foliage")

@@ -15,7 +15,7 @@ from lic_drake.errors import LicError
 from lic_drake.evaluate.plots import ATTEMPT_COLORS, draw_density, draw_top_view, save_figure
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.trace import ReachTrace
-from lic_drake.scene.scene import FIXED_COLOR, MOVABLE_COLOR
+from lic_drake.scene.looks import FIXED_COLOR, MOVABLE_COLOR
 
 Y = np.linspace(-0.4, 0.4, 5)
 PHI = np.linspace(-1.5, 1.5, 4)

@@ -1,13 +1,11 @@
 import base64
 import re
 import struct
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.colors import rgb_to_hsv
-from matplotlib.image import imread
+from browser import assert_shows_a_scene, hue_share, visit
 from reaches import free_space, reach_request, small_clutter
 from worlds import cylinder, make_clutter
 
@@ -170,28 +168,22 @@ def test_a_browser_shows_arm_clutter_goal_and_start_line(tmp_path: Path, chromiu
     result = Environment(scenario, instance).reach(P_WG, EASY_START, keep_states=True)
     recording.add_reach(result.trace, P_WG)
     recording.save(tmp_path / "reach.html")
-    picture = tmp_path / "reach.png"
-    command = [
-        *(chromium, "--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader"),
-        *("--enable-unsafe-swiftshader", "--virtual-time-budget=6000", "--window-size=1200,800"),
-        *(f"--user-data-dir={tmp_path / 'profile'}", f"--screenshot={picture}"),
-        f"file://{tmp_path / 'reach.html'}",
-    ]
-    subprocess.run(command, check=True, capture_output=True, timeout=120)
-
+    image, console = visit(chromium, f"file://{tmp_path / 'reach.html'}", tmp_path)
+    assert console == []
     # Without the upper edge, where Meshcat puts its controls.
-    image = imread(picture)[40:, :, :3]
-    assert len(np.unique(image.reshape(-1, 3), axis=0)) > 500
-    hue, saturation, value = np.moveaxis(rgb_to_hsv(image), -1, 0)
-    hue = 360.0 * hue
+    assert_shows_a_scene(image[40:])
+    assert hue_share(image[40:], 25, 50) > 2e-3, "movable cylinders"
+    assert hue_share(image[40:], 0, 20) > 2e-3, "fixed cylinders"
+    assert hue_share(image[40:], 110, 150) > 1e-4, "start line"
 
-    def share(low: float, high: float) -> float:
-        return float(np.mean((hue > low) & (hue < high) & (saturation > 0.3)))
 
-    # Hues in degrees: movable 35, fixed 8, start line 130, goal 188; the arm is grey, darker
-    # than the background.
-    assert share(25, 50) > 2e-3, "movable cylinders"
-    assert share(0, 20) > 2e-3, "fixed cylinders"
-    assert share(110, 150) > 1e-4, "start line"
-    assert share(175, 200) > 5e-5, "goal"
-    assert np.mean((saturation < 0.12) & (value > 0.3) & (value < 0.93)) > 2e-3, "arm"
+@pytest.mark.slow
+@pytest.mark.browser
+def test_an_empty_scene_and_a_console_error_are_noticed(tmp_path: Path, chromium: str) -> None:
+    page = tmp_path / "page.html"
+    page.write_text("<body><script>console.log('one'); none()</script></body>", encoding="utf-8")
+    image, console = visit(chromium, f"file://{page}", tmp_path)
+    assert len(console) == 2
+    assert "none is not defined" in console[1]
+    with pytest.raises(AssertionError):
+        assert_shows_a_scene(image)

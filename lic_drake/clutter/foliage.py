@@ -1,0 +1,287 @@
+"""foliage-aperture-clutter: springy stems with leaves behind a board with apertures (paper V-B)."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lic_drake.clutter.board import ApertureBoard
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.clutter.placement import MAX_TRIES, place_discs
+from lic_drake.clutter.stems import Stems
+from lic_drake.errors import ScenarioError
+
+Vector = NDArray[np.float64]
+
+MAX_STEMS = 300
+MAX_LEAVES = 50
+"""More stems, or leaves on one of them, are refused."""
+
+
+@dataclass(kw_only=True)
+class FoliageApertureClutter(ApertureBoard):
+    """Parameters of the category: those of the board and of the foliage behind it.
+
+    The paper shows a bank of artificial foliage (Fig. 1) and gives no number of it:
+    `models/scenarios/foliage-aperture-clutter.yaml` says how they were chosen.
+    """
+
+    num_blocked: int = 6
+    # So many more apertures have a cover that leaves a part of them open, of this range of shares.
+    num_partly_covered: int = 2
+    covered_share: list[float] = field(default_factory=lambda: [0.3, 0.7])
+    # Thickness of the covers, metres; they are panels in the middle of the board.
+    cover_m: float = 0.01
+    # The box in which everything grows, (x, y, z) in W, metres. Stems are rooted in its floor or
+    # hang from its ceiling, and stay this far within its sides, where there is room for leaves.
+    lower: list[float] = field(default_factory=lambda: [0.54, -0.69, 0.48])
+    upper: list[float] = field(default_factory=lambda: [0.81, 0.31, 1.4])
+    margin_m: float = 0.05
+    # Height of the trough that holds the roots, metres.
+    trough_m: float = 0.15
+    # Springy stems and fixed branches; the share of both that hangs; distance between roots.
+    num_stems: int = 40
+    num_branches: int = 6
+    hanging_share: float = 0.4
+    root_distance_m: float = 0.04
+    # Ranges of lengths, metres, and largest slant, degrees.
+    stem_length_m: list[float] = field(default_factory=lambda: [0.4, 0.75])
+    branch_length_m: list[float] = field(default_factory=lambda: [0.25, 0.45])
+    max_slant_deg: float = 12.0
+    stem_radius_m: float = 0.004
+    branch_radius_m: float = 0.006
+    # Flexural rigidity EI of a stem, N m^2, mass per length, kg/m, and damping ratio.
+    rigidity_N_m2: float = 0.8
+    stem_kg_per_m: float = 0.1
+    damping_ratio: float = 0.3
+    # Leaves on each stem or branch; ranges of their length and width, metres; thickness and mass.
+    leaves_per_stem: int = 9
+    leaf_length_m: list[float] = field(default_factory=lambda: [0.06, 0.1])
+    leaf_width_m: list[float] = field(default_factory=lambda: [0.03, 0.05])
+    leaf_thickness_m: float = 0.002
+    leaf_kg: float = 0.002
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("num_stems", "num_branches"):
+            if not 0 <= getattr(self, name) <= MAX_STEMS:
+                raise ScenarioError(f"{name} must be from 0 to {MAX_STEMS}: {getattr(self, name)}")
+        if not 0 <= self.leaves_per_stem <= MAX_LEAVES:
+            raise ScenarioError(
+                f"leaves_per_stem must be from 0 to {MAX_LEAVES}, got {self.leaves_per_stem}"
+            )
+        for name in (
+            *(
+                "cover_m",
+                "margin_m",
+                "trough_m",
+                "root_distance_m",
+                "stem_radius_m",
+                "branch_radius_m",
+            ),
+            *("rigidity_N_m2", "stem_kg_per_m", "damping_ratio", "leaf_thickness_m", "leaf_kg"),
+        ):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise ScenarioError(f"{name} must be a positive number, got {value}")
+        for name in ("stem_length_m", "branch_length_m", "leaf_length_m", "leaf_width_m"):
+            _check_range(name, getattr(self, name), np.inf)
+        _check_range("covered_share", self.covered_share, 1.0)
+        if not 0.0 <= self.hanging_share <= 1.0:
+            raise ScenarioError(f"hanging_share must be from 0 to 1, got {self.hanging_share}")
+        if not 0.0 <= self.max_slant_deg <= 45.0:
+            raise ScenarioError(f"max_slant_deg must be from 0 to 45, got {self.max_slant_deg}")
+        covered = self.num_blocked + self.num_partly_covered
+        if not (self.num_partly_covered >= 0 and covered < self.rows * self.columns):
+            raise ScenarioError(
+                f"num_blocked and num_partly_covered must leave one of {self.rows * self.columns}"
+                f" apertures open, got {self.num_blocked} and {self.num_partly_covered}"
+            )
+        self._check_box()
+
+    def _check_box(self) -> None:
+        for name in ("lower", "upper"):
+            value = getattr(self, name)
+            if len(value) != 3 or not np.all(np.isfinite(value)):
+                raise ScenarioError(f"{name} must be [x, y, z] in metres, got {value}")
+        if not np.all(np.array(self.lower) < self.upper):
+            raise ScenarioError(f"lower {self.lower} must be below upper {self.upper} in x, y, z")
+        if self.lower[0] < self.board_back_m:
+            raise ScenarioError(
+                f"foliage from x = {self.lower[0]:.3f} m on would grow through the board, whose"
+                f" back is at {self.board_back_m:.3f} m; raise lower or move board_centre"
+            )
+        if self.upper[0] - self.lower[0] <= 2.0 * self.margin_m:
+            raise ScenarioError(
+                f"margins of {self.margin_m} m leave nothing between x = {self.lower[0]} and"
+                f" {self.upper[0]} m"
+            )
+        height = self.upper[2] - self.lower[2]
+        longest = max(self.stem_length_m[1], self.branch_length_m[1])
+        if longest > height:
+            raise ScenarioError(
+                f"stems of {longest} m are longer than the box of {height:.3f} m is tall"
+            )
+
+    def sample(self, rng: np.random.Generator) -> ClutterInstance:
+        """Draws one environment: the foliage, and then what covers the apertures.
+
+        The foliage of an environment does not depend on how many apertures are covered. The
+        apertures of the instance are those that nothing covers.
+
+        Raises:
+            ScenarioError: The stems do not fit into the box.
+        """
+        stems = self._grow(rng)
+        p_WA = self.aperture_centres()
+        order = rng.permutation(len(p_WA))
+        shares = _draw(rng, self.covered_share, len(p_WA))
+        hangs = rng.random(len(p_WA)) < 0.5
+        shares[order[: self.num_blocked]] = 1.0
+        covered = np.sort(order[: self.num_blocked + self.num_partly_covered])
+        p_WB, edges = map(np.vstack, zip(self.bar_boxes(), self._supports(), strict=True))
+        n, k = len(p_WB), len(covered)
+        return ClutterInstance(
+            category="foliage-aperture-clutter",
+            shape=("box",) * (n + k),
+            size=np.vstack([edges, self._cover_edges(shares[covered])]),
+            p_WO=np.vstack([p_WB, self._cover_centres(p_WA[covered], shares[covered], hangs)]),
+            yaw=np.zeros(n + k),
+            mass=np.ones(n + k),
+            movable=np.zeros(n + k, dtype=bool),
+            p_WA=np.delete(p_WA, covered, axis=0),
+            stems=stems,
+            material=("wood",) * (n - 2) + ("clay", "wood") + ("cardboard",) * k,
+        )
+
+    def _supports(self) -> tuple[Vector, Vector]:
+        """Returns centres and edges of the trough below and the beam above, each shape (2, 3)."""
+        low, high, up = np.array(self.lower), np.array(self.upper), np.eye(3)[2]
+        middle, edges = 0.5 * (low + high), high - low
+        trough, beam = edges.copy(), edges.copy()
+        trough[2], beam[2] = self.trough_m, self.bar_m
+        p_WB = [middle - 0.5 * (edges + trough) * up, middle + 0.5 * (edges + beam) * up]
+        return np.array(p_WB), np.array([trough, beam])
+
+    def _cover_edges(self, shares: Vector) -> Vector:
+        width = np.full(len(shares), self.aperture_m)
+        return np.column_stack([np.full(len(shares), self.cover_m), width, self._heights(shares)])
+
+    def _cover_centres(self, p_WA: Vector, shares: Vector, hangs: NDArray[np.bool_]) -> Vector:
+        """Returns the covers' centres; a cover of a part stands below or hangs above."""
+        offset = 0.5 * (self.aperture_m - self._heights(shares))
+        sign = np.where(hangs[: len(shares)], 1.0, -1.0)
+        centres: Vector = p_WA + np.outer(sign * offset, [0.0, 0.0, 1.0])
+        return centres
+
+    def _heights(self, shares: Vector) -> Vector:
+        """Returns heights of covers, which reach to the middle of a bar, metres."""
+        clear = self.aperture_m - self.bar_m
+        return np.where(shares < 1.0, shares * clear + 0.5 * self.bar_m, self.aperture_m)
+
+    def _grow(self, rng: np.random.Generator) -> Stems:
+        m = self.num_stems + self.num_branches
+        fixed = np.arange(m) >= self.num_stems
+        low, high = (
+            np.array(self.lower[:2]) + self.margin_m,
+            np.array(self.upper[:2]) - self.margin_m,
+        )
+        roots = place_discs(rng, m, low, high, self.root_distance_m)
+        hangs = rng.random(m) < self.hanging_share
+        length = np.where(
+            fixed, _draw(rng, self.branch_length_m, m), _draw(rng, self.stem_length_m, m)
+        )
+        p_WH = np.column_stack([roots, np.where(hangs, self.upper[2], self.lower[2])])
+        R_WS = np.array([self._slant(rng, *row) for row in zip(p_WH, length, hangs, strict=True)])
+        leaves = [
+            self._leaf(rng, p, R, s)
+            for p, R, s in zip(p_WH, R_WS.reshape(-1, 3, 3), length, strict=True)
+            for _ in range(self.leaves_per_stem)
+        ]
+        # As stiff at the tip as a cantilever of that rigidity: L^2 / k = L^3 / (3 EI).
+        stiffness = np.where(fixed, np.inf, 3.0 * self.rigidity_N_m2 / length)
+        mass = self.stem_kg_per_m * length + self.leaf_kg * self.leaves_per_stem
+        inertia = mass * length**2 / 3.0
+        damping = np.where(
+            fixed,
+            0.0,
+            2.0 * self.damping_ratio * np.sqrt(3.0 * self.rigidity_N_m2 / length * inertia),
+        )
+        return Stems(
+            p_WH=p_WH,
+            R_WS=R_WS.reshape(-1, 3, 3),
+            length=length,
+            radius=np.where(fixed, self.branch_radius_m, self.stem_radius_m),
+            mass=mass,
+            stiffness=stiffness,
+            damping=damping,
+            leaf_stem=np.repeat(np.arange(m), self.leaves_per_stem),
+            p_SL=np.array([leaf[0] for leaf in leaves]).reshape(-1, 3),
+            R_SL=np.array([leaf[1] for leaf in leaves]).reshape(-1, 3, 3),
+            leaf_size=np.array([leaf[2] for leaf in leaves]).reshape(-1, 3),
+        )
+
+    def _slant(self, rng: np.random.Generator, p_WH: Vector, length: float, hangs: bool) -> Vector:
+        """Draws R_WS of a stem whose tip stays within the box."""
+        for _ in range(MAX_TRIES):
+            slant, azimuth = (
+                np.deg2rad(self.max_slant_deg) * rng.random(),
+                rng.uniform(0, 2 * np.pi),
+            )
+            R_WS = _rotation(azimuth, np.pi - slant if hangs else slant)
+            if self._holds(p_WH + length * R_WS[:, 2], self.margin_m):
+                return R_WS
+        raise ScenarioError(
+            f"a stem of {length:.3f} m at {p_WH.round(3)} does not fit between lower {self.lower}"
+            f" and upper {self.upper}; make the box larger or max_slant_deg larger than 0"
+        )
+
+    def _leaf(
+        self, rng: np.random.Generator, p_WH: Vector, R_WS: Vector, length: float
+    ) -> tuple[Vector, Vector, Vector]:
+        """Draws position, orientation and size of a leaf on a stem, within the box."""
+        for _ in range(MAX_TRIES):
+            size = np.array(
+                [
+                    _draw(rng, self.leaf_length_m, 1)[0],
+                    _draw(rng, self.leaf_width_m, 1)[0],
+                    self.leaf_thickness_m,
+                ]
+            )
+            along = length * rng.uniform(0.1, 1.0)
+            # Outwards and up the stem, by 10 to 60 degrees from straight across, and twisted.
+            R_SL = _rotation(rng.uniform(0.0, 2.0 * np.pi), -np.deg2rad(rng.uniform(10.0, 60.0)))
+            twist = np.deg2rad(rng.uniform(-45.0, 45.0))
+            c, s = np.cos(twist), np.sin(twist)
+            R_SL = R_SL @ np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+            p_SL = np.array([0.0, 0.0, along]) + 0.5 * size[0] * R_SL[:, 0]
+            corners = 0.5 * size * (np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, -1).T)
+            if self._holds(p_WH + (p_SL + corners @ R_SL.T) @ R_WS.T):
+                return p_SL, R_SL, size
+        raise ScenarioError(
+            f"no leaf on the stem at {p_WH.round(3)} fits between lower {self.lower} and upper"
+            f" {self.upper}; make the box larger or leaf_length_m smaller"
+        )
+
+    def _holds(self, p_WQ: Vector, margin: float = 0.0) -> bool:
+        """Tells whether the box holds points, those of a stem away from its sides."""
+        inset = np.array([margin, margin, 0.0])
+        low, high = np.array(self.lower) + inset, np.array(self.upper) - inset
+        return bool(np.all(p_WQ >= low) and np.all(p_WQ <= high))
+
+
+def _draw(rng: np.random.Generator, ends: list[float], n: int) -> Vector:
+    return rng.uniform(ends[0], ends[1], n)
+
+
+def _rotation(azimuth: float, tilt: float) -> Vector:
+    """Returns Rz(azimuth) Ry(tilt): z is tilted towards the azimuth."""
+    ca, sa, ct, st = np.cos(azimuth), np.sin(azimuth), np.cos(tilt), np.sin(tilt)
+    return np.array([[ca * ct, -sa, ca * st], [sa * ct, ca, sa * st], [-st, 0.0, ct]])
+
+
+def _check_range(name: str, value: list[float], highest: float) -> None:
+    if len(value) != 2 or not (0.0 < value[0] <= value[1] < highest):
+        raise ScenarioError(
+            f"{name} must be [least, most], positive and below {highest:g}, got {value}"
+        )

@@ -1,0 +1,1 @@
+"""Perception: simulated cameras, and what is found in their images (paper V-B)."""

@@ -1,0 +1,182 @@
+"""What the cameras see of an environment: Drake's RGB-D sensors."""
+
+from typing import NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import (
+    Box,
+    ClippingRange,
+    ColorRenderCamera,
+    DepthRange,
+    DepthRenderCamera,
+    FrameId,
+    GeometryInstance,
+    MakePhongIllustrationProperties,
+    PerceptionProperties,
+    RenderCameraCore,
+    RenderLabel,
+    Rgba,
+    SceneGraph,
+    Shape,
+    Sphere,
+)
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.systems.framework import Context, DiagramBuilder
+from pydrake.systems.sensors import CameraInfo, ImageDepth32F, ImageRgba8U, RgbdSensor
+
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.perception.config import CameraConfig, CamerasConfig, ExternalConfig
+from lic_drake.perception.image import CameraImage
+from lic_drake.perception.noise import disturbed_image
+from lic_drake.perception.rendering import make_renderer
+from lic_drake.robots.pr2_head import HEAD_CAMERA, RIGHT_ARM_AT_REST, LookingPr2
+from lic_drake.scene.scene import SceneConfig, add_scene
+
+Vector = NDArray[np.float64]
+
+BALL_COLOR = np.array([0.95, 0.80, 0.05, 1.0])
+FLOOR_COLOR = np.array([0.62, 0.62, 0.64, 1.0])
+
+_RENDERER = "vtk"
+_CLIPPING_M = (0.02, 20.0)
+
+
+class Views(NamedTuple):
+    """Images of an environment.
+
+    Attributes:
+        head: From the PR2's head.
+        external: From the camera that sees the goal.
+    """
+
+    head: CameraImage
+    external: CameraImage
+
+
+def take_views(instance: ClutterInstance, p_WG: Vector, cameras: CamerasConfig) -> Views:
+    """Looks at an environment with a ball at the goal, before the robot drives up to it.
+
+    Images and poses are exact; `disturbed` adds the errors.
+
+    Args:
+        instance: The environment.
+        p_WG: The goal, shape (3,), metres.
+        cameras: The cameras.
+
+    Raises:
+        RenderingError: The renderer cannot work on this machine.
+    """
+    builder = DiagramBuilder()
+    head = cameras.head
+    robot = LookingPr2(head.base_pose, head.torso_m, head.tilt_deg)
+    scene = add_scene(builder, robot, instance, SceneConfig(), visuals=True)
+    plant, scene_graph = scene.plant, scene.scene_graph
+    scene_graph.AddRenderer(_RENDERER, make_renderer())
+    _add_prop(scene_graph, "ball", Sphere(cameras.ball_radius_m), p_WG, BALL_COLOR)
+    _add_prop(scene_graph, "floor", Box(20.0, 20.0, 0.02), np.array([0, 0, -0.01]), FLOOR_COLOR)
+
+    mount = plant.GetFrameByName(HEAD_CAMERA)
+    head_sensor = _make_sensor(
+        plant.GetBodyFrameIdOrThrow(mount.body().index()),
+        mount.GetFixedPoseInBodyFrame(),
+        head.camera,
+    )
+    X_WC_external = _look_at(cameras.external)
+    external_sensor = _make_sensor(
+        scene_graph.world_frame_id(), X_WC_external, cameras.external.camera
+    )
+    for name, sensor in (("head", head_sensor), ("external", external_sensor)):
+        builder.AddNamedSystem(name, sensor)
+        builder.Connect(scene_graph.get_query_output_port(), sensor.query_object_input_port())
+    diagram = builder.Build()
+    root = diagram.CreateDefaultContext()
+    plant_context = plant.GetMyMutableContextFromRoot(root)
+    plant.SetPositions(plant_context, scene.arm, RIGHT_ARM_AT_REST)
+    X_WC_head = mount.CalcPoseInWorld(plant_context)
+    return Views(
+        head=_read(head_sensor, root, X_WC_head, head.camera),
+        external=_read(external_sensor, root, X_WC_external, cameras.external.camera),
+    )
+
+
+def disturbed(views: Views, cameras: CamerasConfig, rng: np.random.Generator) -> Views:
+    """Returns the views with noise and gaps, from poses that are not quite what is believed.
+
+    Args:
+        views: What `take_views` returned.
+        cameras: The cameras with their errors.
+        rng: Source of the draws.
+    """
+    return Views(
+        head=disturbed_image(views.head, cameras.head.camera, rng),
+        external=disturbed_image(views.external, cameras.external.camera, rng),
+    )
+
+
+def _add_prop(
+    scene_graph: SceneGraph, name: str, shape: Shape, p_WO: Vector, color: Vector
+) -> None:
+    """Adds a thing that only cameras notice."""
+    source = scene_graph.RegisterSource(name)
+    geometry = scene_graph.RegisterAnchoredGeometry(
+        source, GeometryInstance(RigidTransform(p_WO), shape, name)
+    )
+    properties = PerceptionProperties()
+    properties.AddProperty("phong", "diffuse", Rgba(*color))
+    properties.AddProperty("label", "id", RenderLabel.kDontCare)
+    scene_graph.AssignRole(source, geometry, properties)
+    scene_graph.AssignRole(source, geometry, MakePhongIllustrationProperties(color))
+
+
+def _make_sensor(parent: FrameId, X_PC: RigidTransform, config: CameraConfig) -> RgbdSensor:
+    core = RenderCameraCore(
+        _RENDERER,
+        CameraInfo(
+            config.width,
+            config.height,
+            config.focal_px,
+            config.focal_px,
+            # The middle of the image. With Drake's own default, half a pixel less, what is straight
+            # ahead is drawn half a pixel off it (2 mm at 2 m).
+            0.5 * config.width,
+            0.5 * config.height,
+        ),
+        ClippingRange(*_CLIPPING_M),
+        RigidTransform(),
+    )
+    return RgbdSensor(
+        parent,
+        X_PC,
+        ColorRenderCamera(core),
+        DepthRenderCamera(core, DepthRange(config.nearest_m, config.furthest_m)),
+    )
+
+
+def _look_at(config: ExternalConfig) -> RigidTransform:
+    """Returns the pose of a camera that looks at a point, its x axis level."""
+    z = np.subtract(config.target, config.p_WC)
+    z /= np.linalg.norm(z)
+    x = np.cross(z, [0.0, 0.0, 1.0])
+    x /= np.linalg.norm(x)
+    R_WC = RotationMatrix(np.column_stack([x, np.cross(z, x), z]))
+    return RigidTransform(R_WC, np.array(config.p_WC))
+
+
+def _read(
+    sensor: RgbdSensor, root: Context, X_WC: RigidTransform, config: CameraConfig
+) -> CameraImage:
+    context = sensor.GetMyContextFromRoot(root)
+    # Copies: what Drake returns may be a view of its own memory.
+    rgba = cast(ImageRgba8U, sensor.color_image_output_port().Eval(context))
+    image = cast(ImageDepth32F, sensor.depth_image_32F_output_port().Eval(context))
+    color = np.array(np.asarray(rgba.data)[..., :3])
+    depth = np.array(np.asarray(image.data)[..., 0], dtype=np.float64)
+    depth[~np.isfinite(depth) | (depth <= 0.0)] = np.nan
+    return CameraImage(
+        color=color,
+        depth=depth,
+        focal_px=config.focal_px,
+        R_WC=np.array(X_WC.rotation().matrix()),
+        p_WC=np.array(X_WC.translation()),
+    )

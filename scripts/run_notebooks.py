@@ -1,0 +1,52 @@
+"""Runs notebooks in place and keeps their outputs, all but the large ones.
+
+Usage: python scripts/run_notebooks.py notebooks/one_reach.ipynb ...
+"""
+
+import argparse
+import time
+from pathlib import Path
+from typing import Any
+
+import nbformat
+from nbclient import NotebookClient
+
+MAX_OUTPUT_BYTES = 150_000
+"""Larger outputs, embedded recordings, are left out; whoever runs the cell sees them."""
+
+
+def run_notebook(path: Path) -> nbformat.NotebookNode:
+    """Returns a notebook with the outputs that it has where it lies."""
+    notebook: nbformat.NotebookNode = nbformat.read(path, as_version=4)  # type: ignore[no-untyped-call]
+    where = {"metadata": {"path": path.parent}}
+    NotebookClient(notebook, timeout=300, kernel_name="python3", resources=where).execute()
+    return notebook
+
+
+def keep_small_outputs(notebook: nbformat.NotebookNode) -> None:
+    """Takes out what is too large for the repository, or different in every run."""
+    for cell in notebook.cells:
+        cell.metadata.pop("execution", None)
+        if cell.cell_type == "code":
+            cell.outputs = [output for output in cell.outputs if _size(output) <= MAX_OUTPUT_BYTES]
+
+
+def _size(output: Any) -> int:
+    return len(str(output))
+
+
+def main() -> None:
+    """Runs the notebooks that the command line names."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("notebooks", nargs="+", type=Path, metavar="NOTEBOOK.ipynb")
+    for path in parser.parse_args().notebooks:
+        began = time.perf_counter()
+        notebook = run_notebook(path)
+        keep_small_outputs(notebook)
+        nbformat.write(notebook, path)  # type: ignore[no-untyped-call]
+        size = path.stat().st_size
+        print(f"{path}: {time.perf_counter() - began:.0f} s, {size / 1000:.0f} kB")
+
+
+if __name__ == "__main__":
+    main()

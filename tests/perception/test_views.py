@@ -1,0 +1,75 @@
+"""Rendered images against rays that are intersected without a renderer."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from ray_casting import blank, draw_ball, draw_instance, tilted
+
+from lic_drake.clutter.foliage import FoliageApertureClutter
+from lic_drake.perception.apertures import BoardModel, find_apertures
+from lic_drake.perception.config import CameraConfig, CamerasConfig, ExternalConfig, HeadConfig
+from lic_drake.perception.goal import find_goal
+from lic_drake.perception.views import Views, disturbed, take_views
+from lic_drake.seeds import make_generator
+
+CAMERA = CameraConfig(width=320, height=240, focal_px=262.5)
+CAMERAS = CamerasConfig(head=HeadConfig(camera=CAMERA), external=ExternalConfig(camera=CAMERA))
+CLUTTER = FoliageApertureClutter(num_stems=3, num_branches=1)
+INSTANCE = CLUTTER.sample(make_generator("training", "views", 0))
+P_WG = np.array([0.84, -0.1, 0.9])
+
+pytestmark = pytest.mark.usefixtures("_renderer")
+
+
+@pytest.fixture(scope="module")
+def views() -> Views:
+    return take_views(INSTANCE, P_WG, CAMERAS)
+
+
+def test_the_head_looks_from_where_it_says_and_sees_the_board(views: Views) -> None:
+    head = views.head
+    np.testing.assert_allclose(head.R_WC, tilted(18.0), atol=1e-9)
+    expected = blank(head.R_WC, head.p_WC)
+    draw_instance(expected, replace(INSTANCE, stems=None))
+    near = np.isfinite(expected.depth) & np.isfinite(head.depth)
+    same = np.abs(head.depth - expected.depth)[near] < 2e-3
+    # Stems stand before nothing of the board, so only pixels on edges may differ.
+    assert near.sum() > 8000
+    assert same.mean() > 0.98
+    # Nothing of the robot, and the foliage is further away than the board.
+    assert np.nanmin(head.depth) > 1.2
+    green = head.color[..., 1] > 1.3 * head.color[..., 0].astype(float)
+    assert green.sum() > 50
+
+
+def test_the_external_camera_sees_the_ball_where_it_is(views: Views) -> None:
+    image = views.external
+    expected = blank(image.R_WC, image.p_WC)
+    draw_ball(expected, P_WG, CAMERAS.ball_radius_m)
+    ball = np.isfinite(expected.depth)
+    yellow = image.color[..., 2] < 0.4 * image.color[..., 0]
+    assert (ball & yellow).sum() > 0.8 * ball.sum()
+    off = np.abs(image.depth - expected.depth)[ball & yellow]
+    assert np.median(off) < 1e-3
+    column, row = image.project(P_WG[None])[0]
+    rows, columns = np.nonzero(ball)
+    assert abs(columns.mean() - column) < 1.0
+    assert abs(rows.mean() - row) < 1.0
+
+
+def test_what_is_rendered_is_found(views: Views) -> None:
+    found = find_apertures(views.head, CAMERA, BoardModel())
+    np.testing.assert_allclose(found.p_WA, CLUTTER.aperture_centres(), atol=0.004)
+    goal = find_goal(views.external, CAMERA, CAMERAS.ball_radius_m)
+    np.testing.assert_allclose(goal.p_WG, P_WG, atol=5e-4)
+
+
+def test_disturbed_views_are_the_same_for_the_same_generator(views: Views) -> None:
+    first, second, other = (
+        disturbed(views, CAMERAS, np.random.default_rng(seed)) for seed in (0, 0, 1)
+    )
+    np.testing.assert_array_equal(first.head.depth, second.head.depth)
+    np.testing.assert_array_equal(first.external.p_WC, second.external.p_WC)
+    assert np.any(first.head.p_WC != other.head.p_WC)
+    assert np.isnan(first.head.depth).sum() > np.isnan(views.head.depth).sum()

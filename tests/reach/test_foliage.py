@@ -1,0 +1,55 @@
+"""Reaches of the PR2 into foliage."""
+
+import numpy as np
+import pytest
+
+from lic_drake.reach.environment import Environment
+from lic_drake.reach.pointing_starts import find_pointing_starts
+from lic_drake.reach.scenario import load_scenario
+from lic_drake.reach.trace import ReachResult
+
+SCENARIO = load_scenario("foliage-aperture-clutter", "{stop: {timeout_s: 3.0}}")
+INSTANCE = SCENARIO.sample_instance("calibration", 1)
+STARTS = find_pointing_starts(SCENARIO, INSTANCE)
+X0 = STARTS.x0[4]
+GOAL = X0[:3] + [0.3, 0.0, 0.0]  # Straight ahead, behind the foliage.
+
+
+@pytest.fixture(scope="module")
+def environment() -> Environment:
+    return Environment(SCENARIO, INSTANCE)
+
+
+@pytest.fixture(scope="module")
+def result(environment: Environment) -> ReachResult:
+    return environment.reach(GOAL, X0, keep_states=True)
+
+
+def test_starts_lie_in_apertures_that_nothing_covers() -> None:
+    assert INSTANCE.p_WA is not None and INSTANCE.stems is not None
+    assert len(STARTS.x0) >= 8
+    np.testing.assert_allclose(STARTS.x0[:, :3], INSTANCE.p_WA[STARTS.aperture], atol=1e-6)
+
+
+def test_an_arm_pushes_stems_aside_and_feels_it(result: ReachResult) -> None:
+    assert result.outcome in ("reached", "stuck", "timeout")
+    assert result.trace.p_WO is not None
+    assert INSTANCE.stems is not None
+    assert result.trace.p_WO.shape == (np.count_nonzero(~INSTANCE.stems.fixed), 2)
+    bent = np.array([state.p_WO for state in result.trace.states])
+    assert np.all(np.isfinite(bent))
+    assert 0.1 < np.abs(bent).max() < 1.5
+    touched = np.flatnonzero(result.trace.peak_force)
+    assert len(touched)
+    assert max(result.trace.peak_force) < 15.0
+    # Nothing moves before it is touched, within a control period.
+    np.testing.assert_array_equal(bent[: touched[0] - 1], 0.0)
+
+
+def test_a_reach_finds_stems_upright_again_and_is_the_same(
+    environment: Environment, result: ReachResult
+) -> None:
+    again = environment.reach(GOAL, X0)
+    assert again.outcome == result.outcome
+    np.testing.assert_array_equal(again.trace.q, result.trace.q)
+    np.testing.assert_array_equal(again.trace.peak_force, result.trace.peak_force)

@@ -1,0 +1,153 @@
+"""What the registries accept and refuse."""
+
+import dataclasses
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from lic_drake.clutter import registry as clutter
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.clutter.registry import get_category, register_category
+from lic_drake.errors import LicError, ScenarioError
+from lic_drake.estimate import categories
+from lic_drake.estimate import registry as estimate
+from lic_drake.estimate.categories import features_of, register_features
+from lic_drake.estimate.checks import EstimateError
+from lic_drake.estimate.features import PLANAR_LIC1
+from lic_drake.estimate.nearest_neighbours import NearestNeighbours
+from lic_drake.estimate.registry import register_estimator
+from lic_drake.extensions import load_extensions
+from lic_drake.paths import models_dir
+from lic_drake.registration import add_entry
+from lic_drake.robots.planar import PlanarArm, planar_arm
+from lic_drake.robots.registry import get_robot, register_robot
+
+
+def make_category(name: str = "Mine", **changes: object) -> type:
+    def sample(self: object, rng: np.random.Generator) -> ClutterInstance:
+        raise NotImplementedError
+
+    members = {"sample": sample, "__annotations__": {"size_m": float}, "size_m": 0.1, **changes}
+    return dataclasses.dataclass(kw_only=True)(type(name, (), members))
+
+
+@pytest.fixture(autouse=True)
+def _restore(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(clutter, "_CATEGORIES", dict(clutter._CATEGORIES))
+    monkeypatch.setattr(categories, "_CATEGORIES", dict(categories._CATEGORIES))
+    monkeypatch.setattr(estimate, "_ESTIMATORS", dict(estimate._ESTIMATORS))
+
+
+@pytest.mark.parametrize("name", ["", "two words", "../up", "a.yaml", "tab\t", 7, None])
+def test_a_name_is_one_plain_word(name: object) -> None:
+    with pytest.raises(LicError, match="name of a category"):
+        add_entry({}, "category", name, object(), LicError)
+
+
+def test_a_cell_that_is_run_again_replaces_its_entry() -> None:
+    for size_m in (0.1, 0.2):
+        register_category("mine", make_category(size_m=size_m))
+    assert get_category("mine")().size_m == 0.2
+
+
+def test_nobody_takes_anothers_name() -> None:
+    register_category("mine", make_category())
+    with pytest.raises(ScenarioError, match=r"'mine' is known already.*choose another name"):
+        register_category("mine", make_category("Yours"))
+    with pytest.raises(ScenarioError, match="cylinder-clutter"):
+        register_category("cylinder-clutter", make_category())
+    with pytest.raises(ScenarioError, match="planar-arm"):
+        register_robot("planar-arm", PlanarArm)
+    with pytest.raises(EstimateError, match="gp"):
+        register_estimator("gp", lambda features: NearestNeighbours())
+    assert get_robot("planar-arm") is planar_arm()
+
+
+def test_a_name_of_an_estimator_means_one_method() -> None:
+    register_estimator("mine", lambda features: NearestNeighbours())
+    register_estimator("mine", lambda features: NearestNeighbours())
+    register_estimator("other1", lambda features: NearestNeighbours())
+    for name in ("rnd", "cost", "gp1", "mine1", "other"):
+        with pytest.raises(EstimateError, match=f"'{name}'.*choose another name"):
+            register_estimator(name, lambda features: NearestNeighbours())
+
+
+def test_entries_are_checked_when_they_are_registered() -> None:
+    with pytest.raises(ScenarioError, match="dataclass"):
+        register_category("mine", SimpleNamespace)
+    with pytest.raises(ScenarioError, match="dataclass"):
+        register_category("mine", make_category()())
+    with pytest.raises(ScenarioError, match="sample"):
+        register_category("mine", make_category(sample=None))
+    with pytest.raises(ScenarioError, match=r"'size_m'.*__future__"):
+        register_category("mine", make_category(__annotations__={"size_m": "float"}))
+
+    @dataclasses.dataclass
+    class NoDefault:
+        size_m: float
+
+        def sample(self, rng: np.random.Generator) -> ClutterInstance:
+            raise NotImplementedError
+
+    with pytest.raises(ScenarioError, match=r"'size_m'.*default"):
+        register_category("mine", NoDefault)
+    with pytest.raises(ScenarioError, match="function"):
+        register_robot("mine", planar_arm())
+    with pytest.raises(EstimateError, match="function"):
+        register_estimator("mine", NearestNeighbours())
+
+
+def test_features_of_a_category_may_be_said_twice_but_not_otherwise() -> None:
+    register_features("mine")
+    register_features("mine")
+    assert features_of("mine").first == PLANAR_LIC1
+    with pytest.raises(EstimateError, match="other features"):
+        register_features("mine", observed=("first_final_x",))
+    with pytest.raises(EstimateError, match="observed"):
+        register_features("yours", observed=("smell",))
+
+
+def described(*changes: tuple[str, str]) -> str:
+    text = (models_dir() / "planar_arm.urdf").read_text(encoding="utf-8")
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    return text
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ([('<axis xyz="0 0 1"/>', '<axis xyz="0 0 -1"/>')], "joints about"),
+        ([('<origin xyz="0 -0.334 0"/>', '<origin xyz="0.334 0 0"/>')], "links along"),
+        ([('name="tip"', 'name="hand"')], "tip"),
+        ([('type="revolute"', 'type="fixed"')], "degrees of freedom"),
+        ([('lower="-2.61799387799" upper="2.61799387799" ', "")], "limits"),
+        ([("drake:controller_gains", "drake:other")], "gains"),
+        ([('<link name="link2">', '<link name="forearm">')], "link2"),
+        ([('<drake:capsule radius="0.015" length="0.334"/>', '<sphere radius="0.1"/>')], "capsule"),
+        ([("</robot>", "")], "planar arm"),
+    ],
+)
+def test_a_description_of_another_kind_of_arm_is_refused(
+    changes: list[tuple[str, str]], said: str
+) -> None:
+    with pytest.raises(ScenarioError, match=rf"description of mine(?s:.)*{said}") as caught:
+        PlanarArm(described(*changes), name="mine")
+    assert "\n" not in str(caught.value)
+
+
+def test_extensions_are_read_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    load_extensions.cache_clear()
+    monkeypatch.setenv("LIC_EXTENSIONS", " json ,, ")
+    load_extensions()
+    monkeypatch.setenv("LIC_EXTENSIONS", "no.such.module")
+    load_extensions()
+    load_extensions.cache_clear()
+    for name in ("no.such.module", ".relative"):
+        monkeypatch.setenv("LIC_EXTENSIONS", name)
+        with pytest.raises(LicError, match=f"'{name}'.*PYTHONPATH"):
+            load_extensions()
+    monkeypatch.undo()
+    load_extensions.cache_clear()
