@@ -20,14 +20,14 @@ class ApertureBoard:
     """
 
     # The board's centre in W, metres; it is upright, across x.
-    board_centre: list[float] = field(default_factory=lambda: [0.5, -0.19, 0.94])
+    board_centre: list[float] = field(default_factory=lambda: [0.53, -0.29, 0.89])
     columns: int = 5
     rows: int = 4
     # Distance of neighbouring apertures' centres, and width and thickness of the bars between
     # them, metres. The bars take their width from the apertures: with centres 0.2 m apart (paper
     # IV-B) there is no other room, and so do the poles of the authors' planar generator.
     aperture_m: float = 0.2
-    bar_m: float = 0.02
+    bar_m: float = 0.01
     # So many apertures are blocked, at random.
     num_blocked: int = 0
 

@@ -34,8 +34,8 @@ class FoliageApertureClutter(ApertureBoard):
     cover_m: float = 0.01
     # The box in which everything grows, (x, y, z) in W, metres. Stems are rooted in its floor or
     # hang from its ceiling, and stay this far within its sides, where there is room for leaves.
-    lower: list[float] = field(default_factory=lambda: [0.54, -0.69, 0.48])
-    upper: list[float] = field(default_factory=lambda: [0.81, 0.31, 1.4])
+    lower: list[float] = field(default_factory=lambda: [0.56, -0.79, 0.43])
+    upper: list[float] = field(default_factory=lambda: [0.81, 0.21, 1.35])
     margin_m: float = 0.05
     # Height of the trough that holds the roots, metres.
     trough_m: float = 0.15

@@ -26,8 +26,8 @@ class SphereApertureClutter(ApertureBoard):
     radius_m: float = 0.05
     mass_kg: float = 0.1
     # Box for the spheres' centres, (x, y, z) in W, metres.
-    lower: list[float] = field(default_factory=lambda: [0.58, -0.54, 0.74])
-    upper: list[float] = field(default_factory=lambda: [0.77, 0.16, 1.14])
+    lower: list[float] = field(default_factory=lambda: [0.59, -0.64, 0.69])
+    upper: list[float] = field(default_factory=lambda: [0.78, 0.06, 1.09])
 
     def __post_init__(self) -> None:
         super().__post_init__()

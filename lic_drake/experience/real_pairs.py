@@ -31,7 +31,8 @@ def pair_real_attempts(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray
         LibraryError: There is no second attempt, or one without the first attempt before it.
     """
     lengths = np.array([len(after) for after in columns["after"]], dtype=int)
-    start = _IN_SPACE if len(_IN_SPACE) in lengths else _IN_PLANE
+    in_space = np.any(columns.get("start_qw", np.zeros(1)) != 0.0)
+    start = _IN_SPACE if in_space else _IN_PLANE
     task = ("stream", "environment", "goal_x", "goal_y", "goal_z")
     first_of = {
         (*(columns[name][i] for name in task), *(float(columns[name][i]) for name in start)): i

@@ -22,7 +22,7 @@ class LibrarySummary:
         streams: Seed streams of the environments, sorted.
         environments: Number of different environments.
         goals: Number of different goals.
-        starts: Number of different start poses.
+        starts: Number of different places and directions of the hand at the start.
         successes: Number of reaches that arrived at their goal.
         success_interval: Wilson 90 % interval of the success rate.
         outcomes: Outcome -> number of reaches, most frequent first.
@@ -76,7 +76,7 @@ def summarize(library: ExperienceLibrary) -> LibrarySummary:
         environments=len(set(zip(columns["stream"], columns["environment"], strict=True))),
         goals=len(set(zip(columns["goal_x"], columns["goal_y"], columns["goal_z"], strict=True))),
         starts=len(
-            set(zip(columns["start_x"], columns["start_y"], columns["start_phi"], strict=True))
+            set(zip(*(columns[f"start_{axis}"] for axis in ("x", "y", "z", "phi")), strict=True))
         ),
         successes=successes,
         success_interval=wilson_interval(successes, reaches),

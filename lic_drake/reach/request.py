@@ -110,7 +110,7 @@ class ReachRequest:
             self,
             start=_numbers(x0),
             base=_pair(p_WR),
-            torso=self.torso if torso_m is None else torso_m,
+            torso=self.torso if torso_m is None else float(torso_m),
             after=(*self.after, earlier),
         )
 
@@ -150,7 +150,7 @@ def make_request(
         goal=_triple(p_WG),
         start=_numbers(x0),
         base=(0.0, 0.0) if p_WR is None else _pair(p_WR),
-        torso=scenario.task.torso_m if torso_m is None else torso_m,
+        torso=scenario.task.torso_m if torso_m is None else float(torso_m),
     )
 
 

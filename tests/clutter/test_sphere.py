@@ -75,6 +75,7 @@ def test_a_board_is_closed_but_for_its_open_apertures(
 ) -> None:
     clutter = SphereApertureClutter(
         num_spheres=0,
+        lower=[0.62, -0.64, 0.69],  # Behind the thickest bars.
         rows=rows,
         columns=columns,
         aperture_m=aperture_m,
