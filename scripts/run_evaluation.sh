@@ -6,7 +6,7 @@ cd "$(dirname "$0")/.."
 results=notebooks/results
 
 lic collect models/experience/cylinder-clutter --environments 20
-for library in "passage-clutter 120" "cylinder-aperture-clutter 480"; do
+for library in "passage-clutter 120" "cylinder-aperture-clutter 480" "sphere-aperture-clutter 40"; do
     # shellcheck disable=SC2086
     set -- $library
     [ -e "models/experience/$1/training.parquet" ] ||
@@ -52,3 +52,11 @@ evaluate_on_bounds cylinder-clutter --stream holdout --common-goals --environmen
 evaluate_on_bounds passage-clutter --stream holdout --environments 300
 evaluate_on_bounds cylinder-aperture-clutter --environments 100
 python scripts/learning_curve.py
+
+# The PR2, with half of the apertures blocked; base and torso move, or stay.
+evaluate_pr2() {
+    evaluate sphere-aperture-clutter 300 1 --methods rnd cost gp knn \
+        --set '{clutter: {num_blocked: 10}}' "$@"
+}
+evaluate_pr2
+evaluate_pr2 --still --variant still

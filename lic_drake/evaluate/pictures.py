@@ -149,7 +149,7 @@ class AperturePictures:
 
     def _path_figure(self, done: Sequence[Attempt]) -> Figure:
         """Returns the tool's paths, from above and from the side."""
-        figure = Figure(figsize=(11, 5))
+        figure = Figure(figsize=(6, 7), layout="constrained")
         for ax, (across, name) in zip(figure.subplots(1, 2), ((1, "y"), (2, "z")), strict=True):
             for i in range(self._instance.num_objects):
                 p, size = self._instance.p_WO[i], self._instance.size[i]
@@ -165,7 +165,7 @@ class AperturePictures:
                 ax.plot(path[:, 0], path[:, across], color=color, lw=2, label=label, zorder=3)
             ax.plot(self._p_WG[0], self._p_WG[across], "o", ms=7, color="tab:cyan", zorder=4)
             ax.set(xlabel="x [m]", ylabel=f"{name} [m]", aspect="equal")
-            ax.legend(loc="upper left", fontsize=8)
+            ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=8)
         return figure
 
 
