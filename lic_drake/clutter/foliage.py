@@ -14,6 +14,7 @@ from lic_drake.errors import ScenarioError
 Vector = NDArray[np.float64]
 
 MAX_STEMS = 300
+"""More stems are refused."""
 MAX_LEAVES = 50
 """More stems, or leaves on one of them, are refused."""
 

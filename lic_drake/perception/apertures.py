@@ -17,6 +17,7 @@ from lic_drake.perception.noise import pose_covariance
 Vector = NDArray[np.float64]
 
 STATES = ("open", "partly", "blocked", "unseen")
+"""What an aperture can be found to be."""
 
 NEAR_M = 0.03
 """What is no further behind the board's front covers it; what is further before it hides it."""

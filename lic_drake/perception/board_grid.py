@@ -22,6 +22,7 @@ GATE_M = 0.02
 """An edge further from where a bar's edge is expected is something else's."""
 
 MIN_EDGES = 50
+"""Fewer edge points than this are no board."""
 
 _CORRELATED = 20
 """So many edge points along a line of pixels count as one: they share their rounding."""

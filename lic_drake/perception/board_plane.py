@@ -13,6 +13,7 @@ from lic_drake.perception.image import CameraImage
 Vector = NDArray[np.float64]
 
 WOOD_HUE = (0.04, 0.13)
+"""Range of hues of the bars, 0 to 1."""
 WOOD_SATURATION = 0.2
 """Brown, light or dark: hues between red and yellow, out of 1, that are not grey."""
 

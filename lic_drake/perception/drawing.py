@@ -14,6 +14,7 @@ from lic_drake.perception.image import CameraImage
 Vector = NDArray[np.float64]
 
 STATE_COLORS = {"open": "tab:green", "partly": "gold", "blocked": "tab:red", "unseen": "0.6"}
+"""Colours of frames around apertures, by what they were found to be."""
 
 
 def draw_image(ax: Axes, image: CameraImage) -> Axes:

@@ -16,7 +16,9 @@ from lic_drake.perception.noise import pose_covariance
 Vector = NDArray[np.float64]
 
 YELLOW_HUE = (0.105, 0.19)
+"""Range of hues of the ball, 0 to 1."""
 YELLOW_SATURATION = 0.6
+"""Least saturation of the ball, 0 to 1."""
 YELLOW_VALUE = 0.25
 """Hues from orange to greenish yellow, out of 1, and how strong and bright they have to be."""
 

@@ -36,7 +36,9 @@ from lic_drake.scene.scene import SceneConfig, add_scene
 Vector = NDArray[np.float64]
 
 BALL_COLOR = np.array([0.95, 0.80, 0.05, 1.0])
+"""Of the goal, RGBA."""
 FLOOR_COLOR = np.array([0.62, 0.62, 0.64, 1.0])
+"""Of the floor, RGBA."""
 
 _RENDERER = "vtk"
 _CLIPPING_M = (0.02, 20.0)

@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from lic_drake.clutter.instance import ClutterInstance
 
 Color = NDArray[np.float64]
+"""RGBA, shape (4,), each 0 to 1."""
 
 FIXED_COLOR = np.array([0.55, 0.25, 0.20, 1.0])
 """Of objects that cannot be pushed, RGBA."""

@@ -21,8 +21,11 @@ OBJECT_RADIUS_M = 0.01
 """Radius of a cylinder, metres."""
 
 PR2_HAND_LENGTH_M = 0.18
+"""From the PR2's wrist to its tool, metres."""
 PR2_HAND_RADIUS_M = 0.06
+"""Radius of its gripper, metres."""
 SPHERE_RADIUS_M = 0.05
+"""Radius of the floating spheres, metres."""
 
 
 def corridor_cost(x0: Vector, p_WG: Vector) -> Vector:

@@ -76,7 +76,7 @@ def test_other_boards_are_found_by_their_rows_columns_and_size() -> None:
     other = replace(BARE, rows=3, columns=4, aperture_m=0.25, bar_m=0.03, num_blocked=3)
     instance = draw(other)
     found = find(look(instance), other)
-    np.testing.assert_allclose(found.p_WA, other.aperture_centres(), atol=0.004)
+    np.testing.assert_allclose(found.p_WA, other.aperture_centres(), atol=0.006)
     assert found.states == true_states(other, instance)
 
 
@@ -126,10 +126,10 @@ def test_the_plane_of_the_board_is_its_front() -> None:
     R_WB = image.R_WC @ plane.R_CB
     np.testing.assert_allclose(R_WB, np.eye(3), atol=0.005)
     p_WO = image.p_WC + image.R_WC @ plane.p_CO
-    assert p_WO[0] == pytest.approx(0.49, abs=0.001)
+    assert p_WO[0] == pytest.approx(0.525, abs=0.002)
     shifted = plane.shifted(0.1)
     p_WO = image.p_WC + image.R_WC @ shifted.p_CO
-    assert p_WO[0] == pytest.approx(0.59, abs=0.001)
+    assert p_WO[0] == pytest.approx(0.625, abs=0.002)
 
 
 def test_without_a_board_that_is_said() -> None:

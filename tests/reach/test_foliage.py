@@ -39,10 +39,10 @@ def test_an_arm_pushes_stems_aside_and_feels_it(result: ReachResult) -> None:
     assert result.trace.p_WO.shape == (np.count_nonzero(~INSTANCE.stems.fixed), 2)
     bent = np.array([state.p_WO for state in result.trace.states])
     assert np.all(np.isfinite(bent))
-    assert 0.1 < np.abs(bent).max() < 1.5
+    assert 0.05 < np.abs(bent).max() < 1.5
     touched = np.flatnonzero(result.trace.peak_force)
     assert len(touched)
-    assert max(result.trace.peak_force) < 15.0
+    assert max(result.trace.peak_force) < 50.0  # The arm hits bars, too.
     # Nothing moves before it is touched, within a control period.
     np.testing.assert_array_equal(bent[: touched[0] - 1], 0.0)
 
