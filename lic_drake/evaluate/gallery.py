@@ -29,6 +29,9 @@ from lic_drake.reach.scenario import load_scenario
 LEARNING_CURVE = Path("learning_curve/learning_curve.csv")
 """As scripts/learning_curve.py writes it; below the folder of all records."""
 
+FIVE_ATTEMPTS = "five-attempts"
+"""Variant of the trials that go on to a fifth attempt."""
+
 HELD_OUT_CALIBRATION = Path("cross_validation/calibration_curves.csv")
 """As scripts/cross_validate.py writes it; below the folder of all records."""
 
@@ -56,15 +59,17 @@ def success_figure(results: Path, category: str) -> Figure:
     return figure
 
 
-def attempts_figure(results: Path, category: str, variant: str = "") -> Figure:
-    """Returns success within k attempts against k, for all strategies of a variant."""
+def attempts_figure(results: Path, category: str) -> Figure:
+    """Returns success within k attempts against k, as far as each strategy was tried."""
     trials = load_trials(results, category)
+    variant = FIVE_ATTEMPTS if FIVE_ATTEMPTS in trials.variants else ""
     counts = {
         method: [
             count(trials.success(method, k, variant))
             for k in range(1, trials.max_attempts(method, variant) + 1)
         ]
-        for method in trials.methods(variant)
+        for method in METHODS
+        if method in trials.methods(variant)
     }
     figure = Figure(figsize=(5.5, 4.0))
     draw_success_by_attempts(figure.subplots(), counts).set_title(category, fontsize=11)

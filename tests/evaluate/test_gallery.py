@@ -7,7 +7,7 @@ from trial_rows import fill_records, make_rows
 from lic_drake.errors import LibraryError
 from lic_drake.evaluate.gallery import FIGURES, attempts_figure, calibration_figure, goals_figure
 from lic_drake.evaluate.paper import TABLES
-from lic_drake.evaluate.trials import write_trials
+from lic_drake.evaluate.trials import read_trials, write_trials
 from lic_drake.reach.scenario import load_scenario
 
 
@@ -48,6 +48,18 @@ def test_the_attempts_figure_goes_as_far_as_each_strategys_trials(tmp_path: Path
     rnd, gp = (container.lines[0].get_xydata() for container in ax.containers)
     np.testing.assert_allclose(rnd, [[1, 25], [2, 50], [3, 75]])
     np.testing.assert_allclose(gp, [[1, 50], [2, 75]])
+
+
+def test_the_attempts_figure_takes_the_trials_that_go_on_where_there_are_some(
+    tmp_path: Path,
+) -> None:
+    results = small_records(tmp_path, "passage-clutter")
+    path = results / "passage-clutter" / "trials.parquet"
+    longer = make_rows("rnd", ["00001", "1"], variant="five-attempts")
+    write_trials(path, [*read_trials(path), *longer, *make_rows("gp>rnd", ["1"])])
+    (ax,) = attempts_figure(results, "passage-clutter").axes
+    (rnd,) = (container.lines[0].get_xydata() for container in ax.containers)
+    np.testing.assert_allclose(rnd, [[1, 50], [2, 50], [3, 50], [4, 50], [5, 100]])
 
 
 def test_calibration_takes_attempts_apart_and_leaves_out_what_does_not_estimate(
