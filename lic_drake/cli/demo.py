@@ -34,7 +34,7 @@ def add_parser(subparsers: Subparsers) -> None:
         " shipped experience library, reaches, and tries once more if that fails. Writes demo.html"
         " (a recording that plays offline), path.png, demo.json and the estimated success over the"
         " starts: density.png in the plane, apertures.png for the PR2.",
-        epilog="example: lic demo --seed 7 --method knn, or lic demo --robot pr2 --seed 3",
+        epilog="example: lic demo --robot pr2 --seed 3 --out out",
     )
     parser.add_argument(
         "--robot",

@@ -25,8 +25,7 @@ def add_parser(subparsers: Subparsers) -> None:
         help="choose the start pose of a reach",
         description="Chooses the start pose for a goal from an experience library and prints it"
         " with its estimated probability of success.",
-        epilog="example: lic select --goal 0.6 0.1 --method knn, or lic select --goal 0.84 -0.2 0.9"
-        " --library models/experience/sphere-aperture-clutter",
+        epilog="example: lic select --goal 0.6 0.1 --method gp",
     )
     parser.add_argument(
         "--goal",
