@@ -1,10 +1,8 @@
 """Every reader meets files that nobody vouches for: a record, or one clear error, and nothing else.
 
-Bad types, missing keys, NaN, huge values, other schemas, tricks in names and paths; nothing that is
-read is executed or unpickled.
+Bad types, missing keys, NaN, huge values, other schemas, tricks in names and paths.
 """
 
-import ast
 import dataclasses
 import json
 import math
@@ -22,7 +20,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from trial_rows import make_rows
 
-import lic_drake
 from lic_drake.errors import LibraryError, LicError, ScenarioError
 from lic_drake.evaluate.gallery import HELD_OUT_CALIBRATION, held_out_calibration_figure
 from lic_drake.evaluate.learning import read_learning_curves
@@ -34,8 +31,6 @@ from lic_drake.experience.schema import make_header, read_table, to_records, to_
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.scenario import load_scenario, parse_scenario
 from lic_drake.yaml_text import parse_yaml
-
-PACKAGE = Path(lic_drake.__file__).parent
 
 ANYTHING = st.recursive(
     st.none()
@@ -376,35 +371,3 @@ def test_a_field_without_end_is_one_clear_error(tmp_path: Path) -> None:
     path.write_text("estimator,size,value,low,high\n" + "x" * 200_000)
     with pytest.raises(LibraryError, match="no learning curve"):
         read_learning_curves(path)
-
-
-EXECUTES = {"eval", "exec", "compile", "__import__"}
-UNPICKLES = {"pickle", "marshal", "shelve", "dill", "joblib", "cloudpickle"}
-ALLOWED = {
-    # Messages between the collector and its own workers, no files.
-    "experience/cluster.py": {"pickle"},
-    # The user's own modules, which an environment variable names.
-    "extensions.py": {"import_module"},
-}
-
-
-def test_nothing_that_is_read_can_be_executed_or_unpickled() -> None:
-    found = []
-    for path in PACKAGE.rglob("*.py"):
-        name = path.relative_to(PACKAGE).as_posix()
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            words: set[str] = set()
-            if isinstance(node, ast.Import):
-                words = {alias.name.split(".")[0] for alias in node.names} & UNPICKLES
-            elif isinstance(node, ast.ImportFrom):
-                words = {(node.module or "").split(".")[0]} & UNPICKLES
-            elif isinstance(node, ast.Call):
-                called = ast.unparse(node.func)
-                if called in EXECUTES or called.endswith(("import_module", "unsafe_load")):
-                    words = {called}
-                if called in ("yaml.load", "yaml.full_load") and name != "yaml_text.py":
-                    words = {called}
-                if any(keyword.arg == "allow_pickle" for keyword in node.keywords):
-                    words = {"allow_pickle"}
-            found += [f"{name}: {word}" for word in words - ALLOWED.get(name, set())]
-    assert found == []
