@@ -79,8 +79,15 @@ def add_parser(subparsers: Subparsers) -> None:
         "--set",
         default="",
         metavar="YAML",
-        help="values put over the library's scenario for what is tried, for instance"
+        help="values put over the scenario that is tried, for instance"
         ' "{clutter: {num_blocked: 10}}" (default: none)',
+    )
+    parser.add_argument(
+        "--scenario",
+        default="",
+        metavar="NAME",
+        help="scenario that is tried, shipped or a .yaml file, with what was learned in the"
+        " library's (default: the library's)",
     )
     parser.add_argument(
         "--still",
@@ -119,6 +126,7 @@ def run(args: argparse.Namespace) -> int:
         variant=args.variant,
         overrides=args.set,
         moves=not args.still,
+        scenario_name=args.scenario,
     )
     remarks = sys.stderr if args.json else sys.stdout
     rows = run_evaluation(

@@ -73,3 +73,20 @@ class Stems:
     def translated(self, offset: Vector) -> "Stems":
         """Returns the same stems moved by an offset, shape (3,), metres."""
         return replace(self, p_WH=self.p_WH + offset)
+
+    def picked(self, which: NDArray[np.bool_]) -> "Stems":
+        """Returns some of the stems with their leaves, by a mask of shape (m,)."""
+        leaves = which[self.leaf_stem]
+        return Stems(
+            p_WH=self.p_WH[which],
+            R_WS=self.R_WS[which],
+            length=self.length[which],
+            radius=self.radius[which],
+            mass=self.mass[which],
+            stiffness=self.stiffness[which],
+            damping=self.damping[which],
+            leaf_stem=(np.cumsum(which) - 1)[self.leaf_stem[leaves]],
+            p_SL=self.p_SL[leaves],
+            R_SL=self.R_SL[leaves],
+            leaf_size=self.leaf_size[leaves],
+        )

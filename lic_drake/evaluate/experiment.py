@@ -18,7 +18,7 @@ from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.experience.workers import prepare_worker
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.rollout import run_reach
-from lic_drake.reach.scenario import Scenario, parse_scenario
+from lic_drake.reach.scenario import Scenario, load_scenario, parse_scenario
 from lic_drake.seeds import make_generator
 from lic_drake.select.baselines import RandomSelector
 from lic_drake.select.registry import (
@@ -55,6 +55,8 @@ class Evaluation:
         overrides: YAML text put over the library's scenario: what is tried may differ from what
             was learned from, for instance by apertures that are blocked.
         moves: Whether a PR2 may move base and torso before a reach.
+        scenario_name: Scenario that is tried where it is not the library's, a name or a path: what
+            was learned in one kind of clutter is used in another.
     """
 
     experience: Path
@@ -71,6 +73,7 @@ class Evaluation:
     second_attempts: Path | None = None
     overrides: str = ""
     moves: bool = True
+    scenario_name: str = ""
 
     @property
     def trials_path(self) -> Path:
@@ -88,6 +91,8 @@ class Evaluation:
         Raises:
             LicError: The library cannot be read, or an override does not fit.
         """
+        if self.scenario_name:
+            return load_scenario(self.scenario_name, self.overrides)
         scenario = ExperienceLibrary(self.experience).scenario()
         if not self.overrides:
             return scenario
@@ -121,7 +126,8 @@ def run_evaluation(
     if library.shard_paths() and library.header().scenario_digest != scenario.digest:
         raise LibraryError(
             f"{library.path} holds reaches of another scenario than the one to be tried"
-            f" ({evaluation.experience}, {evaluation.overrides or 'as it is'}); choose another"
+            f" ({evaluation.scenario_name or evaluation.experience},"
+            f" {evaluation.overrides or 'as it is'}); choose another"
             " folder for the results"
         )
     blocks = _blocks(evaluation)

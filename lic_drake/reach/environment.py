@@ -11,9 +11,10 @@ from lic_drake.reach.diagram import make_reach_diagram
 from lic_drake.reach.request import is_within_reach
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.simulation import Simulation
+from lic_drake.reach.stem_waking import StemWakingSimulation
 from lic_drake.reach.stop_rules import StopMonitor
 from lic_drake.reach.trace import ReachResult, ReachTrace
-from lic_drake.reach.waking import WakingSimulation
+from lic_drake.reach.waking import PartlyAsleep, WakingSimulation
 from lic_drake.robots.arm import Arm
 from lic_drake.scene.sleep import MovedTooFarError, can_sleep
 
@@ -50,8 +51,10 @@ class Environment:
         self.p_WR = np.zeros(3) if p_WR is None else p_WR
         self._in_R = instance.translated(-self.p_WR)
         self._whole: Simulation | None = None
-        self._waking: WakingSimulation | None = None
-        if sleep and can_sleep(instance):
+        self._waking: PartlyAsleep | None = None
+        if sleep and instance.stems is not None:
+            self._waking = StemWakingSimulation(scenario, self._in_R, torso_m)
+        elif sleep and can_sleep(instance):
             self._waking = WakingSimulation(scenario, self._in_R, torso_m)
 
     def reach(self, p_WG: Vector, x0: Vector, keep_states: bool = False) -> ReachResult:
@@ -91,7 +94,7 @@ class Environment:
 
     def _simulate_in(
         self,
-        simulation: Simulation | WakingSimulation,
+        simulation: Simulation | PartlyAsleep,
         angles: Vector,
         p_RG: Vector,
         keep_states: bool,
@@ -116,7 +119,7 @@ class Environment:
 
 
 def simulate(
-    simulation: Simulation | WakingSimulation,
+    simulation: Simulation | PartlyAsleep,
     scenario: Scenario,
     q0: Vector,
     p_WG: Vector,

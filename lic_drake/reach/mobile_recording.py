@@ -38,7 +38,7 @@ class MobileRecording(MeshcatRecording):
     """
 
     def __init__(self, scenario: Scenario, instance: ClutterInstance) -> None:
-        super().__init__(scenario, instance.num_axes)
+        super().__init__(scenario)
         builder = DiagramBuilder()
         arm = Pr2Arm(torso_m=scenario.task.torso_m, mobile=True)
         self._scene = add_scene(builder, arm, instance, scenario.scene, visuals=True)

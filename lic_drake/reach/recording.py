@@ -27,11 +27,15 @@ TICKS_PER_FRAME = 10
 MAX_FRAMES_PER_SECOND = 30.0
 """A recording has no more frames a second."""
 
-_CAMERA = {
-    2: (np.array([-0.4, -0.3, 1.05]), np.array([0.45, 0.02, 0.0])),
-    3: (np.array([-0.45, -1.65, 1.65]), np.array([0.4, -0.15, 0.85])),
-}
-"""Where the camera is, and what it looks at: on the ground, and on a robot and its clutter."""
+_CAMERA_PLANE = (np.array([-0.4, -0.3, 1.05]), np.array([0.45, 0.02, 0.0]))
+"""Where the camera is, and what it looks at: an arm on the ground."""
+_CAMERA_SPACE = (np.array([-0.45, -1.65, 1.65]), np.array([0.4, -0.15, 0.85]))
+"""The same for a robot before its clutter."""
+
+
+def in_plane(scenario: Scenario) -> bool:
+    """Tells whether the robot is an arm in the plane."""
+    return scenario.arm().surface is None
 
 
 def frame_rate(control_rate_hz: float) -> float:
@@ -52,10 +56,9 @@ class MeshcatRecording:
 
     Args:
         scenario: Gives the control rate and the goal's size.
-        num_axes: 2 for clutter on the ground, 3 in space.
     """
 
-    def __init__(self, scenario: Scenario, num_axes: int) -> None:
+    def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
         self._meshcat = _make_meshcat()
         self._frames_per_second = frame_rate(scenario.mpc.rate_hz)
@@ -63,7 +66,7 @@ class MeshcatRecording:
         self._meshcat.SetProperty("/Background/<object>", "bottom_color", [0.97, 0.97, 0.98])
         self._meshcat.SetProperty("/Grid", "visible", False)
         self._meshcat.SetProperty("/Axes", "visible", False)
-        self._meshcat.SetCameraPose(*_CAMERA[num_axes])
+        self._meshcat.SetCameraPose(*(_CAMERA_PLANE if in_plane(scenario) else _CAMERA_SPACE))
         self._meshcat.StartRecording(
             TICKS_PER_FRAME * self._frames_per_second, set_visualizations_while_recording=False
         )
@@ -109,12 +112,12 @@ class ReachRecording(MeshcatRecording):
     def __init__(
         self, scenario: Scenario, instance: ClutterInstance, torso_m: float | None = None
     ) -> None:
-        super().__init__(scenario, instance.num_axes)
+        super().__init__(scenario)
         diagram = make_reach_diagram(
             scenario, instance, self._meshcat, base_slides=True, torso_m=torso_m
         )
         self._drawing = Simulation(diagram, scenario.scene)
-        if instance.num_axes == 2:
+        if in_plane(scenario):
             self._draw_start_line()
 
     def add_reach(self, trace: ReachTrace, p_WG: Vector) -> None:

@@ -1,5 +1,7 @@
 """A simulation in which movable objects sleep, fixed, until the arm comes near them."""
 
+from abc import ABC, abstractmethod
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,23 +18,12 @@ FEWEST_SPARES = 2
 """Spare objects of the first diagram that has any; every further one has twice as many."""
 
 
-class WakingSimulation:
-    """A `Simulation` of an environment with all its movable objects, most of them asleep.
+class PartlyAsleep(ABC):
+    """A simulation of which the sleeping part is fixed or left out, used as a `Simulation`."""
 
-    An object that wakes up is replaced by a spare, and its fixed copy touches nothing any more.
-    When the spares do not suffice, the reach goes on in a diagram with more of them.
-    """
+    _now: Simulation
 
-    def __init__(
-        self, scenario: Scenario, instance: ClutterInstance, torso_m: float | None = None
-    ) -> None:
-        self._scenario = scenario
-        self._instance = instance
-        self._torso_m = torso_m
-        self._axes = SkinAxes(scenario.arm(torso_m), instance.num_axes)
-        self._objects = np.flatnonzero(instance.movable)
-        self._by_spares: dict[int, Simulation] = {}
-
+    @abstractmethod
     def begin(self, q: Vector, p_WG: Vector, time_s: float = 0.0) -> None:
         """Puts the arm at rest at q and every object where the environment has it.
 
@@ -41,12 +32,21 @@ class WakingSimulation:
             p_WG: Goal, shape (3,), metres.
             time_s: Time on the clock, seconds.
         """
-        self._p_WG = p_WG
-        self._awake: list[int] = []  # In the order of the spares that stand for them.
-        self._monitor = SleepMonitor(self._instance, self._axes, q)
-        self._now = self._with_spares(0)
-        self._now.begin(q, p_WG, time_s)
-        self.look_around(q)
+
+    @abstractmethod
+    def state(self) -> SceneState:
+        """Returns the present state of the arm and of all movable objects."""
+
+    @abstractmethod
+    def look_around(self, q: Vector) -> None:
+        """Wakes what has to be awake before the simulation goes on.
+
+        Args:
+            q: The present joint angles, shape (m,), radians.
+
+        Raises:
+            MovedTooFarError: An object may have been touched while it was asleep.
+        """
 
     def is_in_collision(self) -> bool:
         """Tells whether the arm touches anything now."""
@@ -68,6 +68,33 @@ class WakingSimulation:
         """Returns the sensor's reading, shape (num_taxels,), N."""
         return self._now.taxel_force()
 
+
+class WakingSimulation(PartlyAsleep):
+    """A `Simulation` of an environment with all its movable objects, most of them asleep.
+
+    An object that wakes up is replaced by a spare, and its fixed copy touches nothing any more.
+    When the spares do not suffice, the reach goes on in a diagram with more of them.
+    """
+
+    def __init__(
+        self, scenario: Scenario, instance: ClutterInstance, torso_m: float | None = None
+    ) -> None:
+        self._scenario = scenario
+        self._instance = instance
+        self._torso_m = torso_m
+        self._axes = SkinAxes(scenario.arm(torso_m), instance.num_axes)
+        self._objects = np.flatnonzero(instance.movable)
+        self._by_spares: dict[int, Simulation] = {}
+
+    def begin(self, q: Vector, p_WG: Vector, time_s: float = 0.0) -> None:
+        """Puts the arm at rest at q and every object where the environment has it."""
+        self._p_WG = p_WG
+        self._awake: list[int] = []  # In the order of the spares that stand for them.
+        self._monitor = SleepMonitor(self._instance, self._axes, q)
+        self._now = self._with_spares(0)
+        self._now.begin(q, p_WG, time_s)
+        self.look_around(q)
+
     def state(self) -> SceneState:
         """Returns the present state of the arm and of all movable objects."""
         now, n = self._now.state(), len(self._awake)
@@ -76,14 +103,7 @@ class WakingSimulation:
         return SceneState(q=now.q, v=now.v, p_WO=p_WO, v_WO=v_WO)
 
     def look_around(self, q: Vector) -> None:
-        """Wakes what has to be awake before the simulation goes on.
-
-        Args:
-            q: The present joint angles, shape (m,), radians.
-
-        Raises:
-            MovedTooFarError: An object may have been touched while it was asleep.
-        """
+        """Wakes what has to be awake before the simulation goes on."""
         woken = self._monitor.look(q, self._now.object_positions()[: len(self._awake)])
         if woken:
             self._wake(woken)

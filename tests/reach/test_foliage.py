@@ -54,3 +54,14 @@ def test_a_reach_finds_stems_upright_again_and_is_the_same(
     assert again.outcome == result.outcome
     np.testing.assert_array_equal(again.trace.q, result.trace.q)
     np.testing.assert_array_equal(again.trace.peak_force, result.trace.peak_force)
+
+
+def test_a_reach_ends_as_if_no_stem_had_slept(result: ReachResult) -> None:
+    awake = Environment(SCENARIO, INSTANCE, sleep=False).reach(GOAL, X0, keep_states=True)
+    assert awake.outcome == result.outcome
+    for name in ("q", "p_WO"):
+        a, b = (
+            np.array([getattr(state, name) for state in r.trace.states]) for r in (result, awake)
+        )
+        # The solver adds in another order, so the last digits differ.
+        np.testing.assert_allclose(a, b, rtol=0.0, atol=1e-5)
