@@ -52,8 +52,8 @@ class FoliageApertureClutter(ApertureBoard):
     stem_radius_m: float = 0.004
     branch_radius_m: float = 0.006
     # Flexural rigidity EI of a stem, N m^2, mass per length, kg/m, and damping ratio.
-    rigidity_N_m2: float = 0.8
-    stem_kg_per_m: float = 0.1
+    rigidity_N_m2: float = 0.16
+    stem_kg_per_m: float = 0.07
     damping_ratio: float = 0.3
     # Leaves on each stem or branch; ranges of their length and width, metres; thickness and mass.
     leaves_per_stem: int = 9

@@ -7,6 +7,7 @@ from lic_drake.estimate.checks import EstimateError
 from lic_drake.estimate.estimator import SuccessEstimator
 from lic_drake.estimate.features import PLANAR_LIC1, FeatureMap
 from lic_drake.estimate.gaussian_process import GaussianProcess
+from lic_drake.estimate.linear_map import MappedEstimator, can_be_relative, relative_features
 from lic_drake.estimate.local import LocalEstimator
 from lic_drake.estimate.local_process import choose_process
 from lic_drake.estimate.nearest_neighbours import NearestNeighbours
@@ -72,19 +73,42 @@ def estimator_names() -> tuple[str, ...]:
 
 def _process(features: FeatureMap) -> SuccessEstimator:
     """All rows of LIC-1; of LIC-2's many rows the nearest."""
-    if not features.observed:
-        return GaussianProcess()
-    return LocalEstimator(choose_process, features.situation, size=800)
+    return _relative(
+        features,
+        lambda situation: (
+            LocalEstimator(choose_process, situation, size=800)
+            if features.observed
+            else GaussianProcess()
+        ),
+    )
 
 
 def _neighbours(features: FeatureMap) -> SuccessEstimator:
-    if not features.observed:
-        return NearestNeighbours()
-    return LocalEstimator(
-        lambda near: NearestNeighbours(neighbours=400, bandwidth=near.length_scale),
-        features.situation,
-        size=2000,
+    return _relative(
+        features,
+        lambda situation: (
+            LocalEstimator(
+                lambda near: NearestNeighbours(neighbours=400, bandwidth=near.length_scale),
+                situation,
+                size=2000,
+            )
+            if features.observed
+            else NearestNeighbours()
+        ),
     )
+
+
+def _relative(features: FeatureMap, make: Callable[[slice], SuccessEstimator]) -> SuccessEstimator:
+    """Returns an estimator, of a robot in space one of features relative to the goal.
+
+    Args:
+        features: What z means.
+        make: Returns the estimator; gets the part of its features that is the situation.
+    """
+    if not can_be_relative(features):
+        return make(features.situation)
+    matrix, situation = relative_features(features)
+    return MappedEstimator(make(situation), matrix)
 
 
 register_estimator("gp", _process)

@@ -90,15 +90,19 @@ class RandomSelector:
 class CostSelector:
     """COST: the discrete start with the smallest corridor cost, away from failed ones.
 
-    A mobile base and a torso add nothing to the corridor; of equal ones that is taken whose
-    shoulder is nearest to the goal across x, where most of the arm's length is left for the way in.
+    A mobile base and a torso add nothing to the corridor. In the plane, of equal ones that is taken
+    whose shoulder is nearest to the goal across x, where most of the arm's length is left for the
+    way in. A PR2 moves as little as it can: with its shoulder before the goal the forearm jams in
+    the aperture, and COST came to 9 % of the goals instead of 31 %.
 
     Attributes:
         p_RS: The shoulder about which the arm turns, in the robot's frame with the torso at 0,
             shape (3,), metres.
+        b0: Where base and torso are, shape (3,), metres; None for an arm in the plane.
     """
 
     p_RS: Vector = field(default_factory=lambda: np.zeros(3))
+    b0: Vector | None = None
     method: str = "cost"
 
     def select(self, situation: Situation) -> Selection:
@@ -108,10 +112,12 @@ class CostSelector:
         if len(choices) == 0:
             raise RequestError("no discrete start is left away from the failed ones")
         cost = corridor_cost(choices.x0, situation.p_WG)
-        across = slice(1, 2 if choices.x0.shape[1] == IN_PLANE else 3)
-        aside = np.linalg.norm((choices.b0 + self.p_RS - situation.p_WG)[:, across], axis=1)
+        if self.b0 is None:
+            second = np.abs((choices.b0 + self.p_RS - situation.p_WG)[:, 1])
+        else:
+            second = np.linalg.norm(choices.b0 - self.b0, axis=1)
         # Rounded: equal poses have equal costs but for the last digits.
-        i = int(np.lexsort([aside, np.round(cost, 9)])[0])
+        i = int(np.lexsort([second, np.round(cost, 9)])[0])
         return make_selection(situation, choices, i, None, self.method, began)
 
 

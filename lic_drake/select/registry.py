@@ -121,7 +121,8 @@ def make_selector(
         rng = np.random.default_rng(0) if rng is None else rng
         if method == "rnd":
             return RandomSelector(rng=rng)
-        return CostSelector(p_RS=arm.p_RS - [0.0, 0.0, arm.torso_m])
+        moves = isinstance(arm, Pr2Arm)
+        return CostSelector(p_RS=arm.p_RS, b0=np.array([0.0, 0.0, arm.torso_m]) if moves else None)
     if columns is None:
         raise RequestError(f"method {method!r} needs an experience library to learn from")
     features, only_first = features_of(category), method not in estimator_names()

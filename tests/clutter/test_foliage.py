@@ -85,10 +85,10 @@ def test_leaves_begin_on_their_stem() -> None:
 def test_a_stem_gives_way_at_its_tip_as_a_cantilever_of_its_wire() -> None:
     stems = stems_of(sample(SHIPPED))
     length, force = stems.length[~stems.fixed], 0.5
-    wire_N_m2 = 200e9 * np.pi * 0.003**4 / 64.0
+    wire_N_m2 = 200e9 * np.pi * 0.002**4 / 64.0
     cantilever = force * length**3 / (3.0 * wire_N_m2)
     hinge = force * length**2 / stems.stiffness[~stems.fixed]
-    np.testing.assert_allclose(hinge, cantilever, rtol=0.01)
+    np.testing.assert_allclose(hinge, cantilever, rtol=0.02)
 
 
 def is_covered(instance: ClutterInstance, p_WQ: np.ndarray) -> np.ndarray:

@@ -8,7 +8,8 @@ from starts import APERTURES, LINE
 
 from lic_drake.errors import RequestError
 from lic_drake.reach.initial_conditions import InitialConditions
-from lic_drake.reach.starts import ApertureStarts, LineStarts
+from lic_drake.reach.scenario import load_scenario
+from lic_drake.reach.starts import ApertureStarts, LineStarts, make_starts
 from lic_drake.select.baselines import (
     CostSelector,
     RandomSelector,
@@ -180,6 +181,21 @@ def test_of_equally_cheap_starts_cost_takes_the_base_nearest_to_the_goals_y(
     assert corridor_cost(chosen.x0[None], p_WG)[0] == pytest.approx(costs.min(), abs=1e-9)
     nearest = np.abs(grid.p_WR[equal, 1] - y).min()
     assert abs(chosen.p_WR[1] - y) == pytest.approx(nearest, abs=1e-9)
+
+
+def test_cost_moves_a_pr2_no_further_than_the_aperture_asks_for() -> None:
+    scenario = load_scenario("sphere-aperture-clutter", "{clutter: {num_blocked: 10}}")
+    starts = make_starts(scenario, scenario.sample_instance("calibration", 0))
+    p_WG = scenario.sample_goal("calibration", 0)
+    b0 = np.array([0.0, 0.0, scenario.task.torso_m])
+    chosen = CostSelector(b0=b0).select(Situation(p_WG=p_WG, starts=starts))
+    grid = starts.grid
+    costs = corridor_cost(grid.x0, p_WG)
+    assert corridor_cost(chosen.x0[None], p_WG)[0] == pytest.approx(costs.min(), abs=1e-9)
+    here = np.abs(costs - costs.min()) < 1e-9
+    least = np.linalg.norm(grid.b0[here] - b0, axis=1).min()
+    moved = np.linalg.norm([*chosen.p_WR, chosen.torso_m] - b0)
+    assert moved == pytest.approx(least, abs=1e-9)
 
 
 @pytest.mark.parametrize("starts", [LINE, APERTURES])

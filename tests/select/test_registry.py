@@ -68,15 +68,12 @@ def test_a_robot_without_a_selection_is_refused(columns: dict[str, np.ndarray]) 
 
 
 @pytest.mark.parametrize("torso_m", [0.0115, 0.2])
-def test_cost_knows_the_shoulder_of_a_robot_with_its_torso_at_0(torso_m: float) -> None:
-    arm = Pr2Arm(torso_m=torso_m)
-    selector = make_selector("cost", arm)
-    assert isinstance(selector, CostSelector)
-    # The torso moves the shoulder up and down and nowhere else.
-    np.testing.assert_allclose(selector.p_RS + [0.0, 0.0, torso_m], arm.p_RS, atol=1e-12)
+def test_cost_knows_where_base_and_torso_are(torso_m: float) -> None:
+    selector = make_selector("cost", Pr2Arm(torso_m=torso_m))
+    assert isinstance(selector, CostSelector) and selector.b0 is not None
+    np.testing.assert_array_equal(selector.b0, [0.0, 0.0, torso_m])
     planar = make_selector("cost", ARM)
-    assert isinstance(planar, CostSelector)
-    np.testing.assert_array_equal(planar.p_RS, np.zeros(3))
+    assert isinstance(planar, CostSelector) and planar.b0 is None
 
 
 def test_only_the_plain_name_has_lic2(columns: dict[str, np.ndarray]) -> None:
