@@ -57,10 +57,16 @@ def write_drake_models(folder: Path) -> Path:
 def _link(name: str, mesh: str) -> str:
     file = f"package://drake_models/pr2_description/meshes/{mesh}.obj"
     scale = ' scale="2 2 2"' if mesh == "palm" else ""
-    visual = f'<visual><origin xyz="0 0 0.01"/><geometry><mesh filename="{file}"{scale}/></geometry>'
+    visual = (
+        f'<visual><origin xyz="0 0 0.01"/><geometry><mesh filename="{file}"{scale}/></geometry>'
+    )
     hit = '<collision><geometry><mesh filename="package://drake_models/none.obj"/></geometry>'
-    return f'<link name="{name}">{visual}</visual>{hit}</collision></link>' if mesh else (
-        f'<link name="{name}"><visual><geometry><box size="1 1 1"/></geometry></visual></link>'
+    return (
+        f'<link name="{name}">{visual}</visual>{hit}</collision></link>'
+        if mesh
+        else (
+            f'<link name="{name}"><visual><geometry><box size="1 1 1"/></geometry></visual></link>'
+        )
     )
 
 

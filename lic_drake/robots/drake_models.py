@@ -4,7 +4,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -22,7 +22,7 @@ _NETWORK = "DRAKE_ALLOW_NETWORK"
 _DOWNLOAD = f"from pydrake.multibody.parsing import PackageMap; PackageMap().GetPath({PACKAGE!r})"
 
 
-def find_drake_models(download_s: float = DOWNLOAD_S) -> Path:
+def find_drake_models(download_s: float = DOWNLOAD_S, say: Callable[[str], None] = print) -> Path:
     """Returns the folder of the package.
 
     Looks in the folders of ROS_PACKAGE_PATH, then in the cache of Drake's own downloads, and lets
@@ -30,6 +30,7 @@ def find_drake_models(download_s: float = DOWNLOAD_S) -> Path:
 
     Args:
         download_s: How long a download may take, seconds.
+        say: Gets a line before a download.
 
     Raises:
         ModelError: It is nowhere, and there is no network, or one that is too slow.
@@ -40,6 +41,7 @@ def find_drake_models(download_s: float = DOWNLOAD_S) -> Path:
         return Path(packages.GetPath(PACKAGE))
     found = _cached()
     if found is None:
+        say(f"downloading package://{PACKAGE}, for {download_s:g} s at most")
         runs_in_time([sys.executable, "-c", _DOWNLOAD], download_s)
         found = _cached()
     if found is None:
