@@ -45,9 +45,9 @@ def write_drake_models(folder: Path) -> Path:
     urdf.parent.mkdir()
     links = "".join(_link(name, mesh) for name, mesh in LINKS.items())
     joints = "".join(
-        f'<joint name="{child}_joint" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
-        f'<origin xyz="{xyz}"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1"'
-        ' velocity="1"/></joint>'
+        f'<joint name="{child}_joint" type="{kind}"><parent link="{parent}"/>'
+        f'<child link="{child}"/><origin xyz="{xyz}"/><axis xyz="0 0 1"/>'
+        '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
         for parent, child, kind, xyz in JOINTS
     )
     urdf.write_text(f'<robot name="pr2">{links}{joints}</robot>')

@@ -1,4 +1,4 @@
-"""Photographs of a reach: what a camera beside the robot would have seen, and the contact forces."""
+"""Photographs of a reach: what a camera beside the robot would see, and the contact forces."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -130,10 +130,11 @@ class Photographer:
         self._add_prop("floor", floor, np.array([0.0, 0.0, ground - 0.01]), FLOOR_COLOR)
         self._add_prop("goal", Sphere(scenario.stop.success_distance_m), p_WG, GOAL_COLOR)
         self._poses = {name: look_at(*view) for name, view in views.items()}
-        self._sensors = {}
+        self._sensors: dict[str, RgbdSensor] = {}
         for name, X_WC in self._poses.items():
             sensor = RgbdSensor(scene_graph.world_frame_id(), X_WC, *_cameras())
-            self._sensors[name] = builder.AddNamedSystem(name, sensor)
+            builder.AddNamedSystem(name, sensor)
+            self._sensors[name] = sensor
             builder.Connect(scene_graph.get_query_output_port(), sensor.query_object_input_port())
         self._diagram = builder.Build()
         self._context = self._diagram.CreateDefaultContext()

@@ -1,4 +1,4 @@
-"""Finds Drake's public models, `package://drake_models`, without ever waiting long for a network."""
+"""Finds Drake's public models, `package://drake_models`, and never waits long for a network."""
 
 import os
 import signal

@@ -5,11 +5,12 @@ from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import GeometryProperties, Mesh, Role, SceneGraph
+from pydrake.geometry import GeometryProperties, Mesh, Rgba, Role, SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import PackageMap, Parser
 from pydrake.multibody.plant import MultibodyPlant
@@ -110,7 +111,7 @@ def _color(properties: GeometryProperties | None) -> NDArray[np.float64] | None:
     """Returns the colour that the source paints a mesh in."""
     if properties is None or not properties.HasProperty("phong", "diffuse"):
         return None
-    return np.array(properties.GetProperty("phong", "diffuse").rgba)
+    return np.array(cast(Rgba, properties.GetProperty("phong", "diffuse")).rgba)
 
 
 def _looks_only(path: Path) -> str:

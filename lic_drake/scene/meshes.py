@@ -27,6 +27,7 @@ def wear_meshes(scene: Scene, meshes: Sequence[LinkMesh]) -> None:
     """
     plant, scene_graph = scene.plant, scene.scene_graph
     source = plant.get_source_id()
+    assert source is not None
     frames = {
         link: plant.GetBodyFrameIdOrThrow(plant.GetBodyByName(link, scene.arm).index())
         for link in {mesh.link for mesh in meshes}
