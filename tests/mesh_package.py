@@ -72,6 +72,10 @@ def _link(name: str, mesh: str) -> str:
 
 def _write_box(path: Path, extent: float) -> None:
     corners = extent * np.array(list(itertools.product((-1, 1), repeat=3)))
-    faces = ["1 2 4 3", "5 7 8 6", "1 5 6 2", "3 4 8 7", "1 3 7 5", "2 6 8 4"]
-    lines = ["v {} {} {}".format(*corner) for corner in corners] + [f"f {face}" for face in faces]
+    faces = {"-1 0 0": "1243", "1 0 0": "5786", "0 -1 0": "1562", "0 1 0": "3487"}
+    faces |= {"0 0 -1": "1375", "0 0 1": "2684"}
+    lines = ["v {} {} {}".format(*corner) for corner in corners]
+    lines += [f"vn {normal}" for normal in faces]
+    for k, face in enumerate(faces.values(), start=1):
+        lines.append("f " + " ".join(f"{corner}//{k}" for corner in face))
     path.write_text("\n".join(lines) + "\n")

@@ -27,6 +27,7 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.sensors import CameraInfo, ImageRgba8U, RgbdSensor
 
 from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.errors import RenderingError
 from lic_drake.perception.image import CameraImage
 from lic_drake.perception.rendering import make_renderer
 from lic_drake.perception.views import look_at
@@ -47,12 +48,6 @@ GOAL_COLOR = np.array([0.0, 0.65, 0.8, 1.0])
 """Of the goal, RGBA."""
 FLOOR_COLOR = np.array([0.86, 0.86, 0.88, 1.0])
 """Of the floor, RGBA."""
-
-# One high up behind the robot, and one that lights what it leaves dark.
-_LAMPS = (
-    LightParameter(type="directional", frame="world", direction=[0.5, 0.5, -1.0], intensity=0.65),
-    LightParameter(type="directional", frame="camera", direction=[0, 0, 1], intensity=0.75),
-)
 
 _RENDERER = "vtk"
 _CLIPPING_M = (0.02, 20.0)
@@ -98,7 +93,7 @@ class Photographer:
         meshes: What a PR2 wears instead of the shapes of its model.
 
     Raises:
-        RenderingError: The renderer cannot work on this machine.
+        RenderingError: The renderer cannot work on this machine, or not with these meshes.
     """
 
     def __init__(
@@ -109,7 +104,7 @@ class Photographer:
         views: Mapping[str, View],
         meshes: Sequence[LinkMesh] = (),
     ) -> None:
-        renderer = make_renderer(_LAMPS)
+        renderer = make_renderer(_lamps(any(mesh.path.suffix == ".gltf" for mesh in meshes)))
         builder = DiagramBuilder()
         arm = scenario.arm()
         self._on_wheels = isinstance(arm, Pr2Arm)
@@ -124,7 +119,10 @@ class Photographer:
         )
         wear_meshes(self._scene, meshes)
         scene_graph = self._scene.scene_graph
-        scene_graph.AddRenderer(_RENDERER, renderer)
+        try:
+            scene_graph.AddRenderer(_RENDERER, renderer)
+        except RuntimeError as error:  # It loads the meshes now.
+            raise RenderingError(f"a mesh cannot be rendered: {error}") from None
         ground = 0.0 if instance.num_axes == 3 else _FLOOR_BELOW_CLUTTER_M
         floor = Box(_FLOOR_M, _FLOOR_M, 0.02)
         self._add_prop("floor", floor, np.array([0.0, 0.0, ground - 0.01]), FLOOR_COLOR)
@@ -202,6 +200,23 @@ class Photographer:
         properties.AddProperty("phong", "diffuse", Rgba(*color))
         properties.AddProperty("label", "id", RenderLabel.kDontCare)
         scene_graph.AssignRole(source, geometry, properties)
+
+
+def _lamps(physical: bool) -> list[LightParameter]:
+    """Returns a lamp high up behind the robot, and one that lights what that leaves dark.
+
+    Args:
+        physical: Whether a mesh has the materials that make VTK compute all light physically, which
+            needs stronger lamps.
+    """
+    strength = 2.5 if physical else 1.0
+    return [
+        LightParameter(type="directional", frame=frame, direction=direction, intensity=intensity)
+        for frame, direction, intensity in (
+            ("world", [0.5, 0.5, -1.0], 0.65 * strength),
+            ("camera", [0.0, 0.0, 1.0], 0.75 * strength),
+        )
+    ]
 
 
 def _cameras() -> tuple[ColorRenderCamera, DepthRenderCamera]:
