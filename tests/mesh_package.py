@@ -57,17 +57,14 @@ def write_drake_models(folder: Path) -> Path:
 def _link(name: str, mesh: str) -> str:
     file = f"package://drake_models/pr2_description/meshes/{mesh}.obj"
     scale = ' scale="2 2 2"' if mesh == "palm" else ""
-    visual = (
-        f'<visual><origin xyz="0 0 0.01"/><geometry><mesh filename="{file}"{scale}/></geometry>'
-    )
-    hit = '<collision><geometry><mesh filename="package://drake_models/none.obj"/></geometry>'
-    return (
-        f'<link name="{name}">{visual}</visual>{hit}</collision></link>'
-        if mesh
-        else (
-            f'<link name="{name}"><visual><geometry><box size="1 1 1"/></geometry></visual></link>'
-        )
-    )
+    seen = f'<origin xyz="0 0 0.01"/><geometry><mesh filename="{file}"{scale}/></geometry>'
+    if mesh == "base":
+        seen += '<material name="blue"><color rgba="0.2 0.4 0.6 1"/></material>'
+    # What is to be hit is not there: nobody may want it.
+    hit = '<geometry><mesh filename="package://drake_models/none.obj"/></geometry>'
+    if not mesh:
+        seen = hit = '<geometry><box size="1 1 1"/></geometry>'
+    return f'<link name="{name}"><visual>{seen}</visual><collision>{hit}</collision></link>'
 
 
 def _write_box(path: Path, extent: float) -> None:

@@ -105,7 +105,7 @@ def draw_photograph(photograph: Photograph, words: str) -> Figure:
         words: What is said of it.
     """
     image = photograph.image
-    figure = Figure(figsize=(0.0075 * WIDTH, 0.0075 * HEIGHT))
+    figure = Figure(figsize=(0.005 * WIDTH, 0.005 * HEIGHT))
     ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     ax.imshow(image.color)
     ax.set(xlim=(-0.5, WIDTH - 0.5), ylim=(HEIGHT - 0.5, -0.5))
@@ -122,10 +122,10 @@ def draw_photograph(photograph: Photograph, words: str) -> Figure:
             xy=(head[0], head[1]),
             xytext=(tail[0], tail[1]),
             annotation_clip=False,
-            arrowprops={"arrowstyle": "-|>", "color": "crimson", "lw": 2.5, "shrinkA": 0},
+            arrowprops={"arrowstyle": "-|>", "color": "crimson", "lw": 1.8, "shrinkA": 0},
         )
     if np.any(shown):
         words += f"; forces on the arm up to {strength.max():.1f} N"
     paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7}
-    ax.text(30, 45, words, fontsize=13, color="0.15", bbox=paper)
+    ax.text(30, 45, words, fontsize=9, color="0.15", bbox=paper)
     return figure

@@ -5,7 +5,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from pydrake.multibody.parsing import PackageMap
@@ -17,6 +17,9 @@ PACKAGE = "drake_models"
 
 DOWNLOAD_S = 60.0
 """How long a download may take, seconds."""
+
+GRACE_S = 2.0
+"""How long an interrupted program may take to clean up, seconds."""
 
 _NETWORK = "DRAKE_ALLOW_NETWORK"
 _DOWNLOAD = f"from pydrake.multibody.parsing import PackageMap; PackageMap().GetPath({PACKAGE!r})"
@@ -74,19 +77,14 @@ def runs_in_time(command: Sequence[str], limit_s: float) -> bool:
     except subprocess.TimeoutExpired:
         return False
     finally:
-        # An interrupt lets Drake's downloader remove its temporary files.
-        for ending in (signal.SIGINT, signal.SIGKILL):
-            if _is_over(process):
-                break
-            os.killpg(process.pid, ending)
-
-
-def _is_over(process: subprocess.Popen[bytes], grace_s: float = 2.0) -> bool:
-    try:
-        process.wait(0.0 if process.poll() is not None else grace_s)
-    except subprocess.TimeoutExpired:
-        return False
-    return True
+        # An interrupt first: it lets Drake's downloader remove its temporary files.
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGINT)
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(GRACE_S)
+        with suppress(ProcessLookupError):  # Nobody is left.
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
 
 
 def _cached() -> Path | None:
