@@ -46,7 +46,7 @@ WIDTH, HEIGHT, FOCAL_PX = 1280, 960, 1100.0
 
 GOAL_COLOR = np.array([0.0, 0.65, 0.8, 1.0])
 """Of the goal, RGBA."""
-FLOOR_COLOR = np.array([0.86, 0.86, 0.88, 1.0])
+FLOOR_COLOR = np.array([0.74, 0.74, 0.76, 1.0])
 """Of the floor, RGBA."""
 
 _RENDERER = "vtk"

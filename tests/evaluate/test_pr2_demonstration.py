@@ -51,6 +51,12 @@ def test_a_pr2_shows_what_it_did_and_its_reaches_are_those_of_run_reach(
     assert "_meshfile_" in "".join(
         b64decode(text).decode("latin-1") for text in re.findall(r"base64,([\w+/]+=*)", content)
     )
+    stills = [
+        f"attempt {i} {name}" for i in (1, 2) for name in ("start", "middle", "end", "inside")
+    ]
+    if not any("no stills: cameras cannot be simulated" in line for line in lines):
+        assert [kind for kind in result.files if kind.startswith("attempt")] == stills
+        assert all(result.files[kind].read_bytes().startswith(PNG) for kind in stills)
     for kind in ("apertures", "path"):
         assert result.files[kind].read_bytes().startswith(PNG)
     assert "<html" in result.files["recording"].read_text(encoding="utf-8")[:1000].lower()
