@@ -1,9 +1,10 @@
-"""A small package://drake_models: the PR2's links, some of them with a box of a mesh."""
+"""A small package://drake_models: the PR2's links, some with a box of a mesh; no network."""
 
 import itertools
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 PALM_EXTENT = 0.03
 """Half the edge of the palm's mesh before it is scaled, metres."""
@@ -52,6 +53,16 @@ def write_drake_models(folder: Path) -> Path:
     )
     urdf.write_text(f'<robot name="pr2">{links}{joints}</robot>')
     return package
+
+
+def go_offline(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
+    """Leaves Drake an empty cache in a folder, no packages, and a proxy that is not there."""
+    for name in ("ROS_PACKAGE_PATH", "TEST_TMPDIR", "DRAKE_ALLOW_NETWORK", "NO_PROXY", "no_proxy"):
+        monkeypatch.delenv(name, raising=False)
+    for name in ("http_proxy", "https_proxy", "HTTP_PROXY", "HTTPS_PROXY"):
+        monkeypatch.setenv(name, "http://127.0.0.1:9")
+    (folder / "cache").mkdir()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
 
 
 def _link(name: str, mesh: str) -> str:

@@ -8,15 +8,12 @@ import time
 from pathlib import Path
 
 import pytest
-from mesh_package import write_drake_models
+from mesh_package import go_offline, write_drake_models
 from pydrake.common import FindResourceOrThrow
 
 from lic_drake.errors import ModelError
 from lic_drake.robots.drake_models import find_drake_models, runs_in_time
 from lic_drake.robots.pr2_meshes import DESCRIPTION
-
-NOWHERE = "http://127.0.0.1:9"
-"""A proxy that is not there, so that every download fails at once."""
 
 HANGING = """
 import subprocess, sys, time
@@ -29,12 +26,7 @@ time.sleep(60)
 @pytest.fixture(autouse=True)
 def _nothing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """An empty cache, no packages and no network."""
-    for name in ("ROS_PACKAGE_PATH", "TEST_TMPDIR", "DRAKE_ALLOW_NETWORK", "NO_PROXY", "no_proxy"):
-        monkeypatch.delenv(name, raising=False)
-    for name in ("http_proxy", "https_proxy", "HTTP_PROXY", "HTTPS_PROXY"):
-        monkeypatch.setenv(name, NOWHERE)
-    (tmp_path / "cache").mkdir()
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    go_offline(monkeypatch, tmp_path)
 
 
 def refuse(line: str) -> None:
