@@ -23,7 +23,7 @@ PLANAR_VIEWS = {"": View((-0.45, -0.62, 0.95), (0.46, 0.0, -0.08))}
 
 PR2_VIEWS = {
     "": View((-0.75, -2.25, 1.75), (0.22, -0.05, 0.78)),
-    "inside": View((1.8, -1.0, 1.75), (0.55, -0.12, 0.95)),
+    "inside": View((1.8, -1.0, 1.75), (0.55, -0.12, 1.0)),
 }
 """Robot, board and clutter from the right; the clutter from behind the board."""
 
@@ -70,7 +70,7 @@ def save_stills(
     """
     for old in out.glob("attempt[1-9]_*.png"):
         old.unlink()
-    views = PR2_VIEWS if instance.num_axes == 3 else PLANAR_VIEWS
+    views = PLANAR_VIEWS if scenario.arm().surface is None else PR2_VIEWS
     try:
         photographer = Photographer(scenario, instance, p_WG, views, meshes)
     except RenderingError as error:

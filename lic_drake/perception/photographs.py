@@ -123,7 +123,7 @@ class Photographer:
             scene_graph.AddRenderer(_RENDERER, renderer)
         except RuntimeError as error:  # It loads the meshes now.
             raise RenderingError(f"a mesh cannot be rendered: {error}") from None
-        ground = 0.0 if instance.num_axes == 3 else _FLOOR_BELOW_CLUTTER_M
+        ground = 0.0 if self._on_wheels else _FLOOR_BELOW_CLUTTER_M
         floor = Box(_FLOOR_M, _FLOOR_M, 0.02)
         self._add_prop("floor", floor, np.array([0.0, 0.0, ground - 0.01]), FLOOR_COLOR)
         self._add_prop("goal", Sphere(scenario.stop.success_distance_m), p_WG, GOAL_COLOR)
