@@ -68,8 +68,9 @@ def save_stills(
     Raises:
         LicError: A file cannot be written.
     """
-    for old in out.glob("attempt[1-9]_*.png"):
-        old.unlink()
+    for name in ("start", "middle", "end", "inside"):
+        for old in out.glob(f"attempt[1-9]_{name}.png"):
+            old.unlink()
     views = PLANAR_VIEWS if scenario.arm().surface is None else PR2_VIEWS
     try:
         photographer = Photographer(scenario, instance, p_WG, views, meshes)

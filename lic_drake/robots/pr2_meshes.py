@@ -57,10 +57,19 @@ def read_pr2_meshes(package: Path) -> list[LinkMesh]:
     """
     path = package / DESCRIPTION
     try:
-        plant, scene_graph, pr2 = _parse(_looks_only(path), package)
+        meshes = _place(*_parse(_looks_only(path), package))
     except (OSError, ElementTree.ParseError, RuntimeError) as error:
         reason = " ".join(str(error).split())
         raise ModelError(f"the PR2's meshes cannot be read from {path}: {reason}") from None
+    if not meshes:
+        raise ModelError(f"{path} has no mesh for any link of models/pr2/pr2.urdf")
+    return meshes
+
+
+def _place(
+    plant: MultibodyPlant, scene_graph: SceneGraph, pr2: ModelInstanceIndex
+) -> list[LinkMesh]:
+    """Returns the meshes of the source in the frames of our links."""
     ours = _own_links()
     context = plant.CreateDefaultContext()
     parents = {
@@ -89,8 +98,6 @@ def read_pr2_meshes(package: Path) -> list[LinkMesh]:
                         color=_color(inspector.GetIllustrationProperties(geometry)),
                     )
                 )
-    if not meshes:
-        raise ModelError(f"{path} has no mesh for any link of models/pr2/pr2.urdf")
     return meshes
 
 

@@ -49,13 +49,13 @@ def test_each_attempt_has_a_start_a_middle_and_an_end(
     attempt: tuple[Attempt, ReachTrace], tmp_path: Path
 ) -> None:
     (tmp_path / "attempt2_end.png").write_text("of an earlier demonstration")
-    (tmp_path / "attempts.png").write_text("the user's")
+    (tmp_path / "attempt1_mine.png").write_text("the user's")
     never = (attempt[0], ReachTrace())
     lines: list[str] = []
     files = save([attempt, never], tmp_path, lines)
     names = [f"attempt1_{name}.png" for name in ("start", "middle", "end")]
     assert [path.name for path in files.values()] == names
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*names, "attempts.png"])
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*names, "attempt1_mine.png"])
     assert lines == []
     start, middle, end = (imread(path)[..., :3] for path in files.values())
     assert start.shape == (720, 960, 3)

@@ -32,8 +32,9 @@ def test_meshes_are_on_the_links_that_carry_them_where_the_source_has_them(tmp_p
         (lambda text: text[:-20], "cannot be read"),
         (lambda text: text.replace("arm.obj", "lost.obj"), "lost.obj"),
         (lambda text: text.replace("_link", "_rod"), "has no mesh for any link"),
+        (lambda text: text.replace("torso_lift_link", "trunk"), "cannot be read.*torso_lift_link"),
     ],
-    ids=["missing", "damaged", "without a mesh", "another robot"],
+    ids=["missing", "damaged", "without a mesh", "another robot", "a head without a torso"],
 )
 def test_a_package_that_cannot_be_used_is_one_clear_error(
     change, said: str, tmp_path: Path
