@@ -28,6 +28,10 @@ class RenderingError(LicError):
     """Cameras cannot be simulated on this machine as it is."""
 
 
+class ModelError(LicError):
+    """A description of a robot, or its meshes, cannot be had."""
+
+
 class PerceptionError(LicError):
     """What was looked for cannot be found in the images."""
 

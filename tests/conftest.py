@@ -1,4 +1,4 @@
-"""What all tests share: plots without a display, hypothesis settings, a browser."""
+"""What all tests share: plots without a display, hypothesis settings, a browser, a renderer."""
 
 import os
 import shutil
@@ -28,3 +28,15 @@ def chromium() -> str:
         if path := shutil.which(name):
             return path
     pytest.skip("Chromium is missing: apt-get install chromium")
+
+
+@pytest.fixture(scope="session")
+def _renderer() -> None:
+    """Tests that ask for it are skipped where the graphics libraries are missing."""
+    from lic_drake.errors import RenderingError
+    from lic_drake.perception.rendering import make_renderer
+
+    try:
+        make_renderer()
+    except RenderingError as error:
+        pytest.skip(str(error))

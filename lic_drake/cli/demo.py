@@ -2,7 +2,7 @@
 
 import argparse
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from lic_drake.cli.arguments import (
     Subparsers,
@@ -10,6 +10,9 @@ from lic_drake.cli.arguments import (
     add_method_argument,
     non_negative_int,
 )
+
+if TYPE_CHECKING:
+    from lic_drake.robots.pr2_meshes import LinkMesh
 
 
 class _Demonstration(NamedTuple):
@@ -32,8 +35,9 @@ def add_parser(subparsers: Subparsers) -> None:
         help="select a start from past experience, reach into unseen clutter, record it",
         description="Draws an environment that is in no library, selects a start pose from the"
         " shipped experience library, reaches, and tries once more if that fails. Writes demo.html"
-        " (a recording that plays offline), path.png, demo.json and the estimated success over the"
-        " starts: density.png in the plane, apertures.png for the PR2.",
+        " (a recording that plays offline), path.png, demo.json, the estimated success over the"
+        " starts (density.png in the plane, apertures.png for the PR2) and, with a renderer, stills"
+        " of every attempt (attempt1_start.png and so on).",
         epilog="example: lic demo --robot pr2 --seed 3 --out out",
     )
     parser.add_argument(
@@ -59,6 +63,14 @@ def add_parser(subparsers: Subparsers) -> None:
         f' "{_DEMONSTRATIONS["pr2"].overrides}")',
     )
     parser.add_argument(
+        "--visuals",
+        choices=("primitives", "drake_models"),
+        default="primitives",
+        help="what the PR2 looks like: the shapes of its own model, or the meshes of Drake's public"
+        " one, package://drake_models, if they are on this machine or come within a minute"
+        " (default: %(default)s)",
+    )
+    parser.add_argument(
         "--out", type=Path, default=Path("out"), help="folder to write to (default: %(default)s)"
     )
     parser.set_defaults(run=run)
@@ -72,11 +84,27 @@ def run(args: argparse.Namespace) -> int:
     from lic_drake.paths import shipped_library
     from lic_drake.reach.scenario import parse_scenario
 
+    meshes = _find_meshes(args.robot) if args.visuals == "drake_models" else []
     usual = _DEMONSTRATIONS[args.robot]
     library = ExperienceLibrary(args.library or shipped_library(usual.category))
     overrides = usual.overrides if args.set is None else args.set
     scenario = parse_scenario(scenario_text(library.scenario()), overrides, source="--set")
-    result = demonstrate(scenario, library, args.method, args.seed, args.out)
+    result = demonstrate(scenario, library, args.method, args.seed, args.out, meshes=meshes)
     for kind, path in result.files.items():
         print(f"{kind}: {path}")
     return 0
+
+
+def _find_meshes(robot: str) -> list["LinkMesh"]:
+    """Returns Drake's meshes of the PR2; none, with a line that says why, if they cannot be had."""
+    from lic_drake.errors import LicError, ModelError
+    from lic_drake.robots.drake_models import find_drake_models
+    from lic_drake.robots.pr2_meshes import read_pr2_meshes
+
+    if robot != "pr2":
+        raise LicError(f"--visuals drake_models is for --robot pr2, not {robot}; leave it out")
+    try:
+        return read_pr2_meshes(find_drake_models())
+    except ModelError as error:
+        print(f"the PR2 keeps the shapes of its own model: {error}")
+        return []

@@ -71,7 +71,10 @@ def draw_aperture_map(
             edgecolors="0.4",
         )
         text = "-" if np.isnan(value) else f"{100 * value:.0f} %"
-        ax.text(p[1], p[2], text, ha="center", va="center", fontsize=9)
+        # Numbers give way to the goal.
+        near = np.max(np.abs(p_WG[1:] - p[1:])) < half
+        aside = (0.55 * half if p_WG[2] < p[2] else -0.35 * half) if near else 0.0
+        ax.text(p[1], p[2] + aside, text, ha="center", va="center", fontsize=9)
     for label, p in chosen:
         frame = Rectangle(
             (p[1] - half + 0.008, p[2] - half + 0.008),

@@ -3,7 +3,7 @@
 import itertools
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from lic_drake.errors import LicError
 from lic_drake.evaluate.pictures import AperturePictures, Pictures, PlanarPictures
+from lic_drake.evaluate.stills import save_stills
 from lic_drake.evaluate.trial import Attempt, run_trial
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.pointing_starts import PointingStarts
@@ -19,6 +20,8 @@ from lic_drake.reach.request import IN_PLANE, ReachRecord, ReachRequest, is_with
 from lic_drake.reach.rollout import make_record, simulate_request
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.starts import Starts, make_starts
+from lic_drake.reach.trace import ReachTrace
+from lic_drake.robots.pr2_meshes import LinkMesh
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.registry import Selector, make_selector, needs_library
 from lic_drake.select.situation import Selection, Situation
@@ -49,6 +52,7 @@ def demonstrate(
     out: Path,
     attempts: int = 2,
     say: Callable[[str], None] = print,
+    meshes: Sequence[LinkMesh] = (),
 ) -> Demonstration:
     """Selects a start in an unseen environment, reaches, and tries again if that fails.
 
@@ -57,10 +61,11 @@ def demonstrate(
         library: Experience to learn from; its environments come from another seed stream.
         method: Strategy, see `lic_drake.select.registry.method_names`.
         seed: Chooses the environment and the goal.
-        out: Folder for demo.html, demo.json and, in the plane, density.png and path.png, before a
-            board of apertures apertures.png and path.png.
+        out: Folder for demo.html, demo.json, path.png, the stills of `save_stills` and, in the
+            plane, density.png, before a board of apertures apertures.png.
         attempts: How many reaches at the most.
         say: Gets a line for every step.
+        meshes: What a PR2 wears in the pictures instead of the shapes of its model.
 
     Raises:
         LicError: The folder cannot be written, or the method or library cannot be used.
@@ -81,15 +86,18 @@ def demonstrate(
         make_selector(method, arm, columns, np.random.default_rng(seed), scenario.category), say
     )
     if isinstance(starts, PointingStarts):
-        pictures: Pictures = AperturePictures(scenario, instance, starts, p_WG)
+        pictures: Pictures = AperturePictures(scenario, instance, starts, p_WG, meshes)
     else:
         pictures = PlanarPictures(scenario, instance, starts, p_WG)
+
+    traces: list[ReachTrace] = []
 
     def reach(request: ReachRequest) -> ReachRecord:
         began = time.perf_counter()
         result = simulate_request(request, keep_states=True)
         record = make_record(request, result, time.perf_counter() - began)
         pictures.add(request, record, result.trace)
+        traces.append(result.trace)
         say(
             f"attempt {pictures.num_attempts}: {record.outcome} after {record.duration_s:.1f} s,"
             f" nearest to the goal {1000 * record.min_distance:.0f} mm, peak force"
@@ -103,6 +111,7 @@ def demonstrate(
         chosen = make_selector("gp", arm, columns, category=scenario.category)
     assert isinstance(chosen, LicSelector)
     files = {**pictures.save(out, chosen, done), "data": out / "demo.json"}
+    files |= save_stills(scenario, instance, p_WG, done, traces, out, say, meshes)
     demonstration = Demonstration(p_WG=p_WG, attempts=done, files=files)
     _write_json(demonstration, method, seed)
     return demonstration

@@ -20,6 +20,7 @@ from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.starts import Starts
 from lic_drake.reach.trace import ReachTrace
+from lic_drake.robots.pr2_meshes import LinkMesh
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.situation import FailedReach, Situation
 
@@ -94,9 +95,10 @@ class AperturePictures:
         instance: ClutterInstance,
         starts: PointingStarts,
         p_WG: Vector,
+        meshes: Sequence[LinkMesh] = (),
     ) -> None:
         self._instance, self._starts, self._p_WG = instance, starts, p_WG
-        self._recording = MobileRecording(scenario, instance)
+        self._recording = MobileRecording(scenario, instance, meshes)
         self._traces: list[ReachTrace] = []
 
     @property

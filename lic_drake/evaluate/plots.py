@@ -170,13 +170,18 @@ def _draw_arm(ax: Axes, arm: PlanarArm, q: Vector, p_WR: Vector, color: str, alp
         ax.add_patch(Circle((begin[0], begin[1]), capsule.radius, color=color, alpha=alpha, lw=0))
 
 
-def save_figure(figure: Figure, path: Path) -> None:
+def save_figure(figure: Figure, path: Path, margins: bool = True) -> None:
     """Writes a figure at 150 dots an inch.
+
+    Args:
+        figure: The figure.
+        path: The file.
+        margins: Whether it gets small ones around what is drawn, or is written just as it is.
 
     Raises:
         LicError: The file cannot be written.
     """
     try:
-        figure.savefig(path, dpi=150, bbox_inches="tight")
+        figure.savefig(path, dpi=150, bbox_inches="tight" if margins else None)
     except OSError as error:
         raise LicError(f"cannot write {path}: {error.strerror}") from None

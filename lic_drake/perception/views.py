@@ -1,5 +1,6 @@
 """What the cameras see of an environment: Drake's RGB-D sensors."""
 
+from collections.abc import Sequence
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -26,7 +27,7 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.sensors import CameraInfo, ImageDepth32F, ImageRgba8U, RgbdSensor
 
 from lic_drake.clutter.instance import ClutterInstance
-from lic_drake.perception.config import CameraConfig, CamerasConfig, ExternalConfig
+from lic_drake.perception.config import CameraConfig, CamerasConfig
 from lic_drake.perception.image import CameraImage
 from lic_drake.perception.noise import disturbed_image
 from lic_drake.perception.rendering import make_renderer
@@ -84,7 +85,7 @@ def take_views(instance: ClutterInstance, p_WG: Vector, cameras: CamerasConfig) 
         mount.GetFixedPoseInBodyFrame(),
         head.camera,
     )
-    X_WC_external = _look_at(cameras.external)
+    X_WC_external = look_at(cameras.external.p_WC, cameras.external.target)
     external_sensor = _make_sensor(
         scene_graph.world_frame_id(), X_WC_external, cameras.external.camera
     )
@@ -155,14 +156,19 @@ def _make_sensor(parent: FrameId, X_PC: RigidTransform, config: CameraConfig) ->
     )
 
 
-def _look_at(config: ExternalConfig) -> RigidTransform:
-    """Returns the pose of a camera that looks at a point, its x axis level."""
-    z = np.subtract(config.target, config.p_WC)
+def look_at(p_WC: Sequence[float], target: Sequence[float]) -> RigidTransform:
+    """Returns X_WC of a camera that looks at a point, its x axis level.
+
+    Args:
+        p_WC: Where the camera is, (x, y, z), metres.
+        target: What it looks at, neither right above nor right below it, (x, y, z), metres.
+    """
+    z = np.subtract(target, p_WC)
     z /= np.linalg.norm(z)
     x = np.cross(z, [0.0, 0.0, 1.0])
     x /= np.linalg.norm(x)
     R_WC = RotationMatrix(np.column_stack([x, np.cross(z, x), z]))
-    return RigidTransform(R_WC, np.array(config.p_WC))
+    return RigidTransform(R_WC, np.array(p_WC))
 
 
 def _read(

@@ -1,6 +1,7 @@
 """Records a PR2 that moves base, torso and arm to a start, reaches, and comes back (paper V-B)."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,8 @@ from lic_drake.reach.recording import MeshcatRecording
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.robots.pr2 import Pr2Arm
+from lic_drake.robots.pr2_meshes import LinkMesh
+from lic_drake.scene.meshes import wear_meshes
 from lic_drake.scene.scene import add_scene
 
 Vector = NDArray[np.float64]
@@ -35,13 +38,17 @@ class MobileRecording(MeshcatRecording):
     Args:
         scenario: Robot, task and control rate.
         instance: The environment.
+        meshes: What the robot wears instead of the shapes of its model.
     """
 
-    def __init__(self, scenario: Scenario, instance: ClutterInstance) -> None:
+    def __init__(
+        self, scenario: Scenario, instance: ClutterInstance, meshes: Sequence[LinkMesh] = ()
+    ) -> None:
         super().__init__(scenario)
         builder = DiagramBuilder()
         arm = Pr2Arm(torso_m=scenario.task.torso_m, mobile=True)
         self._scene = add_scene(builder, arm, instance, scenario.scene, visuals=True)
+        wear_meshes(self._scene, meshes)
         plant = self._plant = self._scene.plant
         for of in (self._scene.arm, self._scene.clutter):
             wanted = plant.get_desired_state_input_port(of)

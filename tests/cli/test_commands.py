@@ -101,6 +101,7 @@ def test_what_a_machine_may_read_comes_as_json() -> None:
 
 WRONG = [
     ("demo --method jungle", "'jungle'; choose one of rnd"),
+    ("demo --visuals drake_models", "is for --robot pr2, not planar-arm; leave it out"),
     ("demo --library {none}", "make one with: lic collect"),
     ("reach --scenario jungle", "shipped scenarios: "),
     ("reach --goal 5 0", "choose a nearer goal"),

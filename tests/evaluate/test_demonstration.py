@@ -9,6 +9,7 @@ import pytest
 from fake_reach import make_record, make_request
 
 from lic_drake.errors import LicError, RequestError
+from lic_drake.evaluate import demonstration
 from lic_drake.evaluate.demonstration import demonstrate
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
@@ -40,6 +41,12 @@ def long_library(tmp_path_factory: pytest.TempPathFactory) -> ExperienceLibrary:
 def aperture_library(tmp_path_factory: pytest.TempPathFactory) -> ExperienceLibrary:
     scenario = load_scenario("cylinder-aperture-clutter", "{stop: {timeout_s: 0.2}}")
     return _made_up(tmp_path_factory.mktemp("apertures"), scenario)
+
+
+@pytest.fixture(autouse=True)
+def _no_stills(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stills take longer than what is tested here; test_pr2_demonstration has some."""
+    monkeypatch.setattr(demonstration, "save_stills", lambda *args: {})
 
 
 def _made_up(path: Path, scenario: Scenario) -> ExperienceLibrary:

@@ -1,12 +1,15 @@
 """A PR2 selects, moves, reaches and is recorded; its experience is made up."""
 
 import json
+import re
+from base64 import b64decode
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from fake_reach import make_record
+from mesh_package import write_drake_models
 
 from lic_drake.evaluate.demonstration import demonstrate
 from lic_drake.evaluate.experiment import Evaluation, run_evaluation
@@ -15,6 +18,7 @@ from lic_drake.experience.schema import scenario_text
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import load_scenario, parse_scenario
+from lic_drake.robots.pr2_meshes import read_pr2_meshes
 
 PNG = b"\x89PNG"
 
@@ -40,7 +44,19 @@ def test_a_pr2_shows_what_it_did_and_its_reaches_are_those_of_run_reach(
 ) -> None:
     scenario = parse_scenario(scenario_text(library.scenario()), "{clutter: {num_blocked: 8}}")
     lines: list[str] = []
-    result = demonstrate(scenario, library, "knn", 3, tmp_path, say=lines.append)
+    # What the robot looks like changes nothing of its reaches.
+    meshes = read_pr2_meshes(write_drake_models(tmp_path / "package"))
+    result = demonstrate(scenario, library, "knn", 3, tmp_path, say=lines.append, meshes=meshes)
+    content = result.files["recording"].read_text(encoding="utf-8")
+    assert "_meshfile_" in "".join(
+        b64decode(text).decode("latin-1") for text in re.findall(r"base64,([\w+/]+=*)", content)
+    )
+    stills = [
+        f"attempt {i} {name}" for i in (1, 2) for name in ("start", "middle", "end", "inside")
+    ]
+    if not any("no stills: cameras cannot be simulated" in line for line in lines):
+        assert [kind for kind in result.files if kind.startswith("attempt")] == stills
+        assert all(result.files[kind].read_bytes().startswith(PNG) for kind in stills)
     for kind in ("apertures", "path"):
         assert result.files[kind].read_bytes().startswith(PNG)
     assert "<html" in result.files["recording"].read_text(encoding="utf-8")[:1000].lower()
@@ -49,6 +65,7 @@ def test_a_pr2_shows_what_it_did_and_its_reaches_are_those_of_run_reach(
     first, second = result.attempts
     assert first.record == run_reach(first.request)
     assert second.record == run_reach(second.request)
+    assert first.record.scenario == scenario.digest
     assert second.request.after[0].start == first.request.start
     assert second.request.after[0].torso == first.request.torso
     assert lines[0].startswith("sphere-aperture-clutter, evaluation environment 3: goal at (0.840,")
