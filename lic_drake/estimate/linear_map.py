@@ -11,7 +11,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lic_drake.estimate.checks import EstimateError, Vector, checked_queries, checked_rows
+from lic_drake.estimate.checks import Vector, checked_queries, checked_rows
 from lic_drake.estimate.estimator import Prediction, SuccessEstimator
 from lic_drake.estimate.features import FeatureMap
 
@@ -60,38 +60,39 @@ class MappedEstimator:
 def can_be_relative(features: FeatureMap) -> bool:
     """Tells whether features are those of a robot in space, as `relative_features` needs them."""
     needed = {f"{name}_{axis}" for name in ("goal", "start") for axis in "yz"}
-    if features.observed:
-        needed |= {"first_start_y", "first_start_z"}
     return features.in_space and needed <= set(features.names)
 
 
-def relative_features(features: FeatureMap) -> tuple[Vector, slice]:
-    """Returns the matrix M of a PR2's features, and which of M z the situation decides.
+def relative_features(features: FeatureMap) -> Vector:
+    """Returns the matrix M of a PR2's features, shape (4, d).
 
-    M z is, of the goal G, the start E and, for LIC-2, the failed start F, across x in R: G - F and
-    F, where there is one, and then E - G and E. The roll is left out: where the aperture is says
-    which one the arm takes.
-
-    Raises:
-        EstimateError: The features lack one of these.
+    M z is, of the goal G and the start E, E - G and E, across x in R. The roll is left out: where
+    the aperture is says which one the arm takes.
     """
-    names, rows = features.names, []
+    return np.array(
+        [
+            *(features_apart(features, "start", "goal")),
+            *(_one(features, f"start_{axis}") for axis in "yz"),
+        ]
+    )
 
-    def take(plus: str, minus: str | None = None) -> None:
-        for axis in "yz":
-            row = np.zeros(len(names))
-            for name, sign in ((plus, 1.0), (minus, -1.0)):
-                if name is None:
-                    continue
-                if f"{name}_{axis}" not in names:
-                    raise EstimateError(f"features across x need {name}_{axis}, got {names}")
-                row[names.index(f"{name}_{axis}")] = sign
-            rows.append(row)
 
-    if features.observed:
-        take("goal", "first_start")
-        take("first_start")
-    situation = slice(0, len(rows))
-    take("start", "goal")
-    take("start")
-    return np.array(rows), situation
+def features_apart(features: FeatureMap, one: str, other: str) -> Vector:
+    """Returns the matrix that takes z to the place of one thing from another, across x.
+
+    Args:
+        features: What z means.
+        one: "goal", "start" or "first_start".
+        other: The same.
+
+    Returns:
+        Shape (2, d).
+    """
+    return np.array(
+        [_one(features, f"{one}_{axis}") - _one(features, f"{other}_{axis}") for axis in "yz"]
+    )
+
+
+def _one(features: FeatureMap, name: str) -> Vector:
+    row: Vector = (np.array(features.names) == name).astype(float)
+    return row

@@ -1,16 +1,25 @@
 """The known success estimators. A new one is a file of your own with `register_estimator`."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
+
+import numpy as np
 
 from lic_drake.estimate.checks import EstimateError
 from lic_drake.estimate.estimator import SuccessEstimator
 from lic_drake.estimate.features import PLANAR_LIC1, FeatureMap
 from lic_drake.estimate.gaussian_process import GaussianProcess
-from lic_drake.estimate.linear_map import MappedEstimator, can_be_relative, relative_features
+from lic_drake.estimate.linear_map import (
+    MappedEstimator,
+    can_be_relative,
+    features_apart,
+    relative_features,
+)
 from lic_drake.estimate.local import LocalEstimator
 from lic_drake.estimate.local_process import choose_process
 from lic_drake.estimate.nearest_neighbours import NearestNeighbours
+from lic_drake.estimate.stacked import StackedEstimator
 from lic_drake.extensions import load_extensions
 from lic_drake.registration import add_entry
 
@@ -73,42 +82,36 @@ def estimator_names() -> tuple[str, ...]:
 
 def _process(features: FeatureMap) -> SuccessEstimator:
     """All rows of LIC-1; of LIC-2's many rows the nearest."""
-    return _relative(
-        features,
-        lambda situation: (
-            LocalEstimator(choose_process, situation, size=800)
-            if features.observed
-            else GaussianProcess()
-        ),
-    )
+    if can_be_relative(features):
+        return _in_space(features, GaussianProcess)
+    if not features.observed:
+        return GaussianProcess()
+    return LocalEstimator(choose_process, features.situation, size=800)
 
 
 def _neighbours(features: FeatureMap) -> SuccessEstimator:
-    return _relative(
-        features,
-        lambda situation: (
-            LocalEstimator(
-                lambda near: NearestNeighbours(neighbours=400, bandwidth=near.length_scale),
-                situation,
-                size=2000,
-            )
-            if features.observed
-            else NearestNeighbours()
-        ),
+    if can_be_relative(features):
+        return _in_space(features, NearestNeighbours)
+    if not features.observed:
+        return NearestNeighbours()
+    return LocalEstimator(
+        lambda near: NearestNeighbours(neighbours=400, bandwidth=near.length_scale),
+        features.situation,
+        size=2000,
     )
 
 
-def _relative(features: FeatureMap, make: Callable[[slice], SuccessEstimator]) -> SuccessEstimator:
-    """Returns an estimator, of a robot in space one of features relative to the goal.
-
-    Args:
-        features: What z means.
-        make: Returns the estimator; gets the part of its features that is the situation.
-    """
-    if not can_be_relative(features):
-        return make(features.situation)
-    matrix, situation = relative_features(features)
-    return MappedEstimator(make(situation), matrix)
+def _in_space(features: FeatureMap, make: Callable[[], SuccessEstimator]) -> SuccessEstimator:
+    """Returns an estimator that looks at where the goal is from the start."""
+    if not features.observed:
+        return MappedEstimator(make(), relative_features(features))
+    alone = replace(features, observed=())
+    return StackedEstimator(
+        make_first=lambda: _in_space(alone, make),
+        make_second=make,
+        alone=np.array([features.names.index(name) for name in alone.names]),
+        matrix=features_apart(features, "start", "first_start"),
+    )
 
 
 register_estimator("gp", _process)

@@ -4,10 +4,14 @@ import numpy as np
 import pytest
 
 from lic_drake.estimate.categories import features_of
-from lic_drake.estimate.checks import EstimateError
 from lic_drake.estimate.features import PLANAR_LIC1
 from lic_drake.estimate.gaussian_process import GaussianProcess
-from lic_drake.estimate.linear_map import MappedEstimator, can_be_relative, relative_features
+from lic_drake.estimate.linear_map import (
+    MappedEstimator,
+    can_be_relative,
+    features_apart,
+    relative_features,
+)
 from lic_drake.estimate.registry import make_estimator
 
 FEATURES = features_of("sphere-aperture-clutter")
@@ -16,32 +20,25 @@ Z = RNG.uniform(-0.5, 0.5, (200, 5))
 F = (np.abs(Z[:, 2] - Z[:, 0]) < 0.2).astype(float)
 
 
-def test_features_are_relative_to_goal_and_failed_start() -> None:
-    matrix, situation = relative_features(FEATURES.first)
+def test_features_are_relative_to_the_goal() -> None:
     z = dict(goal_y=1.0, goal_z=2.0, start_y=10.0, start_z=20.0, start_qx=7.0)
     given = np.array([z[name] for name in FEATURES.first.names])
+    matrix = relative_features(FEATURES.first)
     np.testing.assert_array_equal(matrix @ given, [9.0, 18.0, 10.0, 20.0])
-    assert situation == slice(0, 0)
-    matrix, situation = relative_features(FEATURES.second)
     z |= dict(first_start_y=100.0, first_start_z=300.0)
     given = np.array([z[name] for name in FEATURES.second.names])
-    expected = [-99.0, -298.0, 100.0, 300.0, 9.0, 18.0, 10.0, 20.0]
-    np.testing.assert_array_equal(matrix @ given, expected)
-    # What the robot decides changes nothing of the situation.
-    decided = matrix[situation][:, FEATURES.second.decision]
-    assert situation == slice(0, 4) and not np.any(decided)
+    apart = features_apart(FEATURES.second, "start", "first_start")
+    np.testing.assert_array_equal(apart @ given, [-90.0, -280.0])
 
 
-def test_features_that_lack_one_are_refused() -> None:
-    with pytest.raises(EstimateError, match="need start_z"):
-        relative_features(replace(FEATURES.first, start=("start_y", "start_qx")))
+def test_other_features_are_left_as_they_are() -> None:
     assert can_be_relative(FEATURES.first) and can_be_relative(FEATURES.second)
     assert not can_be_relative(PLANAR_LIC1)
-    assert not can_be_relative(replace(FEATURES.second, observed=("first_final_x",)))
+    assert not can_be_relative(replace(FEATURES.first, start=("start_y", "start_qx")))
 
 
 def test_estimates_are_those_of_the_other_estimator() -> None:
-    matrix = relative_features(FEATURES.first)[0]
+    matrix = relative_features(FEATURES.first)
     mapped = MappedEstimator(GaussianProcess(), matrix).fit(Z, F)
     other = GaussianProcess().fit(np.round(Z @ matrix.T, 9), F)
     np.testing.assert_allclose(mapped.values(Z[:20]), other.values(Z[:20] @ matrix.T), atol=1e-6)
@@ -63,5 +60,5 @@ def test_the_gradient_is_that_of_the_estimate(name: str) -> None:
 def test_equal_differences_are_one_feature() -> None:
     # 0.3 - 0.1 and 0.4 - 0.2 differ in the last digit.
     rows = np.array([[0.1, 0.0, 0.3, 0.0, 0.0], [0.2, 0.0, 0.4, 0.0, 0.0]])
-    mapped = MappedEstimator(GaussianProcess(), relative_features(FEATURES.first)[0])._map(rows)
+    mapped = MappedEstimator(GaussianProcess(), relative_features(FEATURES.first))._map(rows)
     np.testing.assert_array_equal(mapped[0, :2], mapped[1, :2])
