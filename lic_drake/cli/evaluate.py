@@ -90,6 +90,13 @@ def add_parser(subparsers: Subparsers) -> None:
         " library's (default: the library's)",
     )
     parser.add_argument(
+        "--cameras",
+        default="",
+        metavar="NAME",
+        help="cameras that have to find apertures and goal, shipped or a .yaml file, for instance"
+        " foliage (default: both are known)",
+    )
+    parser.add_argument(
         "--still",
         action="store_true",
         help="keep base and torso of a PR2 where they are (default: they move along the board)",
@@ -127,6 +134,7 @@ def run(args: argparse.Namespace) -> int:
         overrides=args.set,
         moves=not args.still,
         scenario_name=args.scenario,
+        cameras=args.cameras,
     )
     remarks = sys.stderr if args.json else sys.stdout
     rows = run_evaluation(

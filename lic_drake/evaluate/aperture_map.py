@@ -16,13 +16,14 @@ Vector = NDArray[np.float64]
 def estimate_apertures(objective: Objective, starts: PointingStarts) -> Vector:
     """Returns the highest estimate over base and torso at each open aperture, shape (k,).
 
-    NaN where the arm cannot start from anywhere.
+    It is combined with the chance that the aperture is open, where that is not certain. NaN where
+    the arm cannot start from anywhere.
 
     Args:
         objective: What is estimated.
         starts: The possible initial conditions; the apertures are `starts.p_WA`.
     """
-    values = np.clip(objective.values(starts.grid), 0.0, 1.0)
+    values = np.clip(objective.values(starts.grid), 0.0, 1.0) * starts.chance(starts.grid.x0)
     best = np.full(len(starts.p_WA), np.nan)
     for i, p_WA in enumerate(starts.p_WA):
         here = np.all(np.isclose(starts.grid.x0[:, :3], p_WA), axis=1)

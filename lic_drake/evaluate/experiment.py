@@ -8,14 +8,17 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lic_drake.errors import LibraryError, LicError
+from lic_drake.evaluate.looking import Watch
 from lic_drake.evaluate.trial import Attempt, run_trial
 from lic_drake.evaluate.trials import TrialRow, read_trials, write_trials
 from lic_drake.experience.real_pairs import pair_real_attempts
 from lic_drake.experience.schema import scenario_text
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.experience.workers import prepare_worker
+from lic_drake.perception.config import load_cameras
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario, load_scenario, parse_scenario
@@ -29,6 +32,8 @@ from lic_drake.select.registry import (
     needs_library,
     split_method,
 )
+
+Vector = NDArray[np.float64]
 
 REACHES_A_BLOCK = 60
 """About this many reaches make a unit of work: what an interruption can cost each worker."""
@@ -57,6 +62,9 @@ class Evaluation:
         moves: Whether a PR2 may move base and torso before a reach.
         scenario_name: Scenario that is tried where it is not the library's, a name or a path: what
             was learned in one kind of clutter is used in another.
+        cameras: Cameras that have to find apertures and goal, see
+            `lic_drake.perception.config.load_cameras`; none: both are known. A reach is then a
+            success if it ends in the ball.
     """
 
     experience: Path
@@ -74,6 +82,7 @@ class Evaluation:
     overrides: str = ""
     moves: bool = True
     scenario_name: str = ""
+    cameras: str = ""
 
     @property
     def trials_path(self) -> Path:
@@ -199,17 +208,19 @@ class _Worker:
             attempts = ExperienceLibrary(evaluation.second_attempts)
             self._pairs = pair_real_attempts(attempts.columns())
         self._selectors: dict[str, Selector] = {}
+        self._cameras = load_cameras(evaluation.cameras) if evaluation.cameras else None
         library = evaluation.reaches
         self._known = {r.key: r for r in library.records()} if library.shard_paths() else {}
         self.new: list[ReachRecord] = []
 
-    def run(self, environments: range) -> Iterator[tuple[str, int, int, list[Attempt]]]:
-        """Yields method, environment, goal and attempts of each trial."""
+    def run(self, environments: range) -> Iterator[tuple[str, int, int, list[Attempt], bool]]:
+        """Yields method, environment, goal, attempts and success of each trial."""
         evaluation = self._evaluation
         for environment in environments:
             for goal in range(evaluation.goals):
                 at = evaluation.first_environment if evaluation.common_goals else environment
                 p_WG = self.scenario.sample_goal(evaluation.stream, at, goal)
+                watch = self._watch(environment, p_WG)
                 for method in evaluation.methods:
                     attempts = run_trial(
                         self.scenario,
@@ -221,8 +232,24 @@ class _Worker:
                         fresh=evaluation.fresh,
                         moves=evaluation.moves,
                         reach=self._reach,
+                        look=watch,
                     )
-                    yield method, environment, goal, attempts
+                    last = attempts[-1].record
+                    won = last.success if watch is None else watch.touches_ball(last)
+                    yield method, environment, goal, attempts, won
+
+    def _watch(self, environment: int, p_WG: Vector) -> Watch | None:
+        """Returns the cameras' watch over an environment; all strategies see the same."""
+        if self._cameras is None:
+            return None
+        return Watch(
+            scenario=self.scenario,
+            stream=self._evaluation.stream,
+            environment=environment,
+            p_WG=p_WG,
+            cameras=self._cameras,
+            moves=self._evaluation.moves,
+        )
 
     def _selector(self, method: str, environment: int, goal: int) -> Selector:
         first, later = split_method(method)
@@ -277,13 +304,14 @@ def _run_block(environments: range) -> tuple[list[TrialRow], list[ReachRecord]]:
             goal=goal,
             attempt=number,
             key=attempt.request.key,
-            success=attempt.record.success,
+            # An attempt before the last one failed.
+            success=won and number == len(attempts),
             probability=float("nan")
             if attempt.selection.probability is None
             else attempt.selection.probability,
             seconds=attempt.selection.seconds,
         )
-        for method, environment, goal, attempts in _worker.run(environments)
+        for method, environment, goal, attempts, won in _worker.run(environments)
         for number, attempt in enumerate(attempts, start=1)
     ]
     return rows, _worker.new

@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 
 from lic_drake.clutter.board import ApertureBoard
 from lic_drake.clutter.instance import ClutterInstance
-from lic_drake.errors import PerceptionError, ScenarioError
+from lic_drake.errors import PerceptionError
 from lic_drake.intervals import wilson_interval
-from lic_drake.perception.apertures import STATES, BoardModel, find_apertures
+from lic_drake.perception.apertures import STATES, find_apertures
+from lic_drake.perception.belief import board_of
 from lic_drake.perception.config import CamerasConfig
 from lic_drake.perception.goal import find_goal
 from lic_drake.perception.views import Views, disturbed, take_views
@@ -60,18 +61,6 @@ class GoalError:
     noise: bool
     error_m: float
     chi_squared: float
-
-
-def board_of(scenario: Scenario) -> tuple[ApertureBoard, BoardModel]:
-    """Returns the board of a scenario, and what perception may know of it.
-
-    Raises:
-        ScenarioError: It has none.
-    """
-    board = scenario.clutter
-    if not isinstance(board, ApertureBoard):
-        raise ScenarioError(f"{scenario.category} has no board; use foliage-aperture-clutter")
-    return board, BoardModel(rows=board.rows, columns=board.columns, aperture_m=board.aperture_m)
 
 
 def true_states(board: ApertureBoard, instance: ClutterInstance) -> tuple[str, ...]:

@@ -3,10 +3,12 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from lic_drake.reach.request import ReachRecord, ReachRequest, make_request
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario
-from lic_drake.reach.starts import make_starts
+from lic_drake.reach.starts import Starts, make_starts
 from lic_drake.select.registry import Selector
 from lic_drake.select.situation import FailedReach, Selection, Situation, Vector
 
@@ -31,6 +33,7 @@ def run_trial(
     fresh: bool = False,
     moves: bool = True,
     reach: Callable[[ReachRequest], ReachRecord] = run_reach,
+    look: Callable[[int], tuple[Vector, Starts]] | None = None,
 ) -> list[Attempt]:
     """Selects and reaches until the goal is reached or the attempts are used up.
 
@@ -45,20 +48,26 @@ def run_trial(
             as the attempt before left it, as on a real robot.
         moves: Whether a PR2 may move base and torso before a reach.
         reach: Makes a request's reach.
+        look: Tells where the goal seems to be and which starts seem possible, before an attempt
+            with this number, from 0; by default both are known. With another goal an attempt
+            finds the environment as it was drawn.
     """
-    starts = make_starts(scenario, scenario.sample_instance(stream, environment), moves)
+    if look is None:
+        starts = make_starts(scenario, scenario.sample_instance(stream, environment), moves)
+        look = _knowing(p_WG, starts)
     done: list[Attempt] = []
-    for _ in range(attempts):
+    for number in range(attempts):
+        p_seen, starts = look(number)
         failed = tuple(FailedReach.from_record(attempt.record) for attempt in done)
-        selection = selector.select(Situation(p_WG=p_WG, starts=starts, failed=failed))
-        if done and not fresh:
+        selection = selector.select(Situation(p_WG=p_seen, starts=starts, failed=failed))
+        if done and not fresh and np.array_equal(p_seen, done[-1].request.goal):
             request = done[-1].request.then(selection.x0, selection.p_WR, selection.torso_m)
         else:
             request = make_request(
                 scenario,
                 stream,
                 environment,
-                p_WG,
+                p_seen,
                 selection.x0,
                 selection.p_WR,
                 selection.torso_m,
@@ -67,3 +76,7 @@ def run_trial(
         if done[-1].record.success:
             break
     return done
+
+
+def _knowing(p_WG: Vector, starts: Starts) -> Callable[[int], tuple[Vector, Starts]]:
+    return lambda _: (p_WG, starts)

@@ -83,7 +83,7 @@ class HeadConfig:
 
     # The base's x, y (metres) and heading (radians) in W; height of the torso; how far the head
     # looks down.
-    base_pose: list[float] = field(default_factory=lambda: [-1.0, -0.19, 0.0])
+    base_pose: list[float] = field(default_factory=lambda: [-1.0, -0.29, 0.0])
     torso_m: float = 0.15
     tilt_deg: float = 18.0
     camera: CameraConfig = field(default_factory=CameraConfig)
@@ -98,8 +98,8 @@ class ExternalConfig:
     """A camera that stands by itself, its images upright."""
 
     # Where it is and what it looks at, in W, metres.
-    p_WC: list[float] = field(default_factory=lambda: [2.1, 0.9, 1.5])
-    target: list[float] = field(default_factory=lambda: [0.84, -0.19, 0.94])
+    p_WC: list[float] = field(default_factory=lambda: [2.1, 0.8, 1.45])
+    target: list[float] = field(default_factory=lambda: [0.84, -0.29, 0.89])
     camera: CameraConfig = field(default_factory=CameraConfig)
 
     def __post_init__(self) -> None:

@@ -24,6 +24,7 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context, DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource
 from pydrake.systems.sensors import CameraInfo, ImageDepth32F, ImageRgba8U, RgbdSensor
 
 from lic_drake.clutter.instance import ClutterInstance
@@ -31,8 +32,9 @@ from lic_drake.perception.config import CameraConfig, CamerasConfig
 from lic_drake.perception.image import CameraImage
 from lic_drake.perception.noise import disturbed_image
 from lic_drake.perception.rendering import make_renderer
+from lic_drake.perception.systems import camera_image
 from lic_drake.robots.pr2_head import HEAD_CAMERA, RIGHT_ARM_AT_REST, LookingPr2
-from lic_drake.scene.scene import SceneConfig, add_scene
+from lic_drake.scene.scene import Scene, SceneConfig, add_scene
 
 Vector = NDArray[np.float64]
 
@@ -71,6 +73,51 @@ def take_views(instance: ClutterInstance, p_WG: Vector, cameras: CamerasConfig) 
         RenderingError: The renderer cannot work on this machine.
     """
     builder = DiagramBuilder()
+    rig = add_rig(builder, instance, p_WG, cameras)
+    diagram = builder.Build()
+    root = diagram.CreateDefaultContext()
+    rig.take_position(root)
+    return Views(
+        head=_read(rig.head, root, cameras.head.camera),
+        external=_read(rig.external, root, cameras.external.camera),
+    )
+
+
+class CameraRig(NamedTuple):
+    """An environment with a robot that looks, and its cameras, in a diagram.
+
+    Attributes:
+        scene: Robot and environment.
+        head: The sensor on the robot's head.
+        external: The one that sees the goal.
+    """
+
+    scene: Scene
+    head: RgbdSensor
+    external: RgbdSensor
+
+    def take_position(self, root: Context) -> None:
+        """Puts the robot's right arm beside its body, in a context of the diagram."""
+        plant = self.scene.plant
+        plant.SetPositions(
+            plant.GetMyMutableContextFromRoot(root), self.scene.arm, RIGHT_ARM_AT_REST
+        )
+
+
+def add_rig(
+    builder: DiagramBuilder, instance: ClutterInstance, p_WG: Vector, cameras: CamerasConfig
+) -> CameraRig:
+    """Adds an environment, a ball at the goal, the robot where it looks from, and the cameras.
+
+    Args:
+        builder: Gets plant, scene graph and the sensors `head` and `external`.
+        instance: The environment.
+        p_WG: The goal, shape (3,), metres.
+        cameras: The cameras.
+
+    Raises:
+        RenderingError: The renderer cannot work on this machine.
+    """
     head = cameras.head
     robot = LookingPr2(head.base_pose, head.torso_m, head.tilt_deg)
     scene = add_scene(builder, robot, instance, SceneConfig(), visuals=True)
@@ -78,6 +125,10 @@ def take_views(instance: ClutterInstance, p_WG: Vector, cameras: CamerasConfig) 
     scene_graph.AddRenderer(_RENDERER, make_renderer())
     _add_prop(scene_graph, "ball", Sphere(cameras.ball_radius_m), p_WG, BALL_COLOR)
     _add_prop(scene_graph, "floor", Box(20.0, 20.0, 0.02), np.array([0, 0, -0.01]), FLOOR_COLOR)
+    for model in (scene.arm, scene.clutter):  # Nothing moves, and Drake wants to know what to hold.
+        wanted = plant.get_desired_state_input_port(model)
+        nothing = builder.AddSystem(ConstantVectorSource(np.zeros(wanted.size())))
+        builder.Connect(nothing.get_output_port(), wanted)
 
     mount = plant.GetFrameByName(HEAD_CAMERA)
     head_sensor = _make_sensor(
@@ -85,22 +136,15 @@ def take_views(instance: ClutterInstance, p_WG: Vector, cameras: CamerasConfig) 
         mount.GetFixedPoseInBodyFrame(),
         head.camera,
     )
-    X_WC_external = look_at(cameras.external.p_WC, cameras.external.target)
     external_sensor = _make_sensor(
-        scene_graph.world_frame_id(), X_WC_external, cameras.external.camera
+        scene_graph.world_frame_id(),
+        look_at(cameras.external.p_WC, cameras.external.target),
+        cameras.external.camera,
     )
     for name, sensor in (("head", head_sensor), ("external", external_sensor)):
         builder.AddNamedSystem(name, sensor)
         builder.Connect(scene_graph.get_query_output_port(), sensor.query_object_input_port())
-    diagram = builder.Build()
-    root = diagram.CreateDefaultContext()
-    plant_context = plant.GetMyMutableContextFromRoot(root)
-    plant.SetPositions(plant_context, scene.arm, RIGHT_ARM_AT_REST)
-    X_WC_head = mount.CalcPoseInWorld(plant_context)
-    return Views(
-        head=_read(head_sensor, root, X_WC_head, head.camera),
-        external=_read(external_sensor, root, X_WC_external, cameras.external.camera),
-    )
+    return CameraRig(scene=scene, head=head_sensor, external=external_sensor)
 
 
 def disturbed(views: Views, cameras: CamerasConfig, rng: np.random.Generator) -> Views:
@@ -171,20 +215,11 @@ def look_at(p_WC: Sequence[float], target: Sequence[float]) -> RigidTransform:
     return RigidTransform(R_WC, np.array(p_WC))
 
 
-def _read(
-    sensor: RgbdSensor, root: Context, X_WC: RigidTransform, config: CameraConfig
-) -> CameraImage:
+def _read(sensor: RgbdSensor, root: Context, config: CameraConfig) -> CameraImage:
     context = sensor.GetMyContextFromRoot(root)
-    # Copies: what Drake returns may be a view of its own memory.
-    rgba = cast(ImageRgba8U, sensor.color_image_output_port().Eval(context))
-    image = cast(ImageDepth32F, sensor.depth_image_32F_output_port().Eval(context))
-    color = np.array(np.asarray(rgba.data)[..., :3])
-    depth = np.array(np.asarray(image.data)[..., 0], dtype=np.float64)
-    depth[~np.isfinite(depth) | (depth <= 0.0)] = np.nan
-    return CameraImage(
-        color=color,
-        depth=depth,
-        focal_px=config.focal_px,
-        R_WC=np.array(X_WC.rotation().matrix()),
-        p_WC=np.array(X_WC.translation()),
+    return camera_image(
+        cast(ImageRgba8U, sensor.color_image_output_port().Eval(context)),
+        cast(ImageDepth32F, sensor.depth_image_32F_output_port().Eval(context)),
+        cast(RigidTransform, sensor.body_pose_in_world_output_port().Eval(context)),
+        config.focal_px,
     )

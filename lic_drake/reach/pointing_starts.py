@@ -37,17 +37,27 @@ class PointingStarts:
         scenario: The scenario; its robot is the PR2.
         instance: The environment.
         stand: Where base and torso may be.
+        probability_open: How likely each open aperture really is open, shape (k,); None where that
+            is certain.
     """
 
     scenario: Scenario
     instance: ClutterInstance
     stand: Stand
+    probability_open: Vector | None = None
 
     @property
     def p_WA(self) -> Vector:
         """Centres of the open apertures, shape (k, 3), metres."""
         assert self.instance.p_WA is not None
         return self.instance.p_WA
+
+    def chance(self, x0: Vector) -> Vector:
+        """Returns how likely the apertures of n tool poses, shape (n, 7), are open, shape (n,)."""
+        if self.probability_open is None:
+            return np.ones(len(x0))
+        apart = np.linalg.norm(x0[:, None, :3] - self.p_WA, axis=2)
+        return self.probability_open[np.argmin(apart, axis=1)]
 
     @property
     def all_apertures(self) -> Vector:

@@ -54,12 +54,12 @@ class LicSelector(ABC):
             candidates = candidates.take(situation.allowed(candidates))
         if len(candidates) == 0:
             raise RequestError("no start is left away from the failed ones")
-        values = objective.values(candidates)
+        values = objective.values(candidates) * self._chance(situation, candidates)
         order = np.argsort(-values, kind="stable")
         best = candidates.take(order[:1])
         best_value = float(values[order[0]])
         for improved in self._improve(situation, objective, candidates, values):
-            value = float(objective.values(improved)[0])
+            value = float((objective.values(improved) * self._chance(situation, improved))[0])
             if value > best_value:
                 best, best_value = improved, value
         probability = float(np.clip(best_value, 0.0, 1.0))
@@ -71,6 +71,10 @@ class LicSelector(ABC):
         if self.second is not None and seen:
             return Objective(model=self.second, p_WG=situation.p_WG, failed=seen)
         return Objective(model=self.first, p_WG=situation.p_WG)
+
+    def _chance(self, situation: Situation, conditions: InitialConditions) -> Vector:
+        """Returns how likely n initial conditions are what they seem to be, shape (n,)."""
+        return np.ones(len(conditions))
 
     @abstractmethod
     def _candidates(self, situation: Situation) -> InitialConditions:
@@ -90,7 +94,7 @@ class LicSelector(ABC):
             situation: What was asked.
             objective: What is maximised.
             candidates: Possible starts, n.
-            values: Their estimates, shape (n,).
+            values: Their estimates, times how likely they are what they seem, shape (n,).
         """
 
     def _observable(self, failed: tuple[FailedReach, ...]) -> tuple[FailedReach, ...]:

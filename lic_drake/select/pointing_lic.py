@@ -26,6 +26,9 @@ class PointingLic(LicSelector):
     def _candidates(self, situation: Situation) -> InitialConditions:
         return _pointing(situation).grid
 
+    def _chance(self, situation: Situation, conditions: InitialConditions) -> Vector:
+        return _pointing(situation).chance(conditions.x0)
+
     def _improve(
         self,
         situation: Situation,
