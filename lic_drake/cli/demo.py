@@ -16,16 +16,25 @@ if TYPE_CHECKING:
 
 
 class _Demonstration(NamedTuple):
-    """What a robot shows unless told otherwise."""
+    """What is shown of a category unless told otherwise."""
 
-    category: str
-    overrides: str
+    robot: str
+    library: str
+    overrides: str = ""
+    cameras: str | None = None
 
 
 _DEMONSTRATIONS = {
-    "planar-arm": _Demonstration("cylinder-clutter", ""),
-    "pr2": _Demonstration("sphere-aperture-clutter", "{clutter: {num_blocked: 8}}"),
+    "cylinder-clutter": _Demonstration("planar-arm", "cylinder-clutter"),
+    "passage-clutter": _Demonstration("planar-arm", "passage-clutter"),
+    "cylinder-aperture-clutter": _Demonstration("planar-arm", "cylinder-aperture-clutter"),
+    "sphere-aperture-clutter": _Demonstration(
+        "pr2", "sphere-aperture-clutter", "{clutter: {num_blocked: 8}}"
+    ),
+    # Learned among spheres: the transfer is the point (paper V-B).
+    "foliage-aperture-clutter": _Demonstration("pr2", "sphere-aperture-clutter", cameras="foliage"),
 }
+_USUAL = {"planar-arm": "cylinder-clutter", "pr2": "sphere-aperture-clutter"}
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -37,15 +46,24 @@ def add_parser(subparsers: Subparsers) -> None:
         " shipped experience library, reaches, and tries once more if that fails. Writes demo.html"
         " (a recording that plays offline), path.png, demo.json, the estimated success over the"
         " starts (density.png in the plane, apertures.png for the PR2) and, with a renderer, stills"
-        " of every attempt (attempt1_start.png and so on).",
+        " of every attempt (attempt1_start.png and so on). Before foliage also sequence.html, with"
+        " what the cameras saw, look1.png and so on, and views.webp.",
         epilog="example: lic demo --robot pr2 --seed 3 --out out",
     )
     parser.add_argument(
         "--robot",
-        choices=tuple(_DEMONSTRATIONS),
+        choices=tuple(_USUAL),
         default="planar-arm",
         help="planar-arm among cylinders, or pr2 before a board with blocked apertures (default:"
         " %(default)s)",
+    )
+    parser.add_argument(
+        "--category",
+        choices=tuple(_DEMONSTRATIONS),
+        metavar="NAME",
+        help="clutter category: cylinder-clutter, passage-clutter or cylinder-aperture-clutter for"
+        " planar-arm; sphere-aperture-clutter or foliage-aperture-clutter for pr2, the latter with"
+        " cameras that find apertures and goal (default: the first one of the robot)",
     )
     parser.add_argument(
         "--seed",
@@ -55,12 +73,12 @@ def add_parser(subparsers: Subparsers) -> None:
         help="chooses environment and goal (default: 0)",
     )
     add_method_argument(parser)
-    add_library_argument(parser, "the shipped one for the robot")
+    add_library_argument(parser, "the shipped one for the category, spheres for foliage")
     parser.add_argument(
         "--set",
         metavar="YAML",
-        help="values put over the library's scenario (default: none; for pr2"
-        f' "{_DEMONSTRATIONS["pr2"].overrides}")',
+        help="values put over the scenario (default: none; for spheres"
+        f' "{_DEMONSTRATIONS["sphere-aperture-clutter"].overrides}")',
     )
     parser.add_argument(
         "--visuals",
@@ -78,18 +96,29 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Runs the subcommand and returns the exit code."""
+    from lic_drake.errors import LicError
     from lic_drake.evaluate.demonstration import demonstrate
     from lic_drake.experience.schema import scenario_text
     from lic_drake.experience.store import ExperienceLibrary
     from lic_drake.paths import shipped_library
-    from lic_drake.reach.scenario import parse_scenario
+    from lic_drake.perception.config import load_cameras
+    from lic_drake.reach.scenario import load_scenario, parse_scenario
 
+    category = args.category or _USUAL[args.robot]
+    usual = _DEMONSTRATIONS[category]
+    if usual.robot != args.robot:
+        raise LicError(f"{category} is for --robot {usual.robot}, not {args.robot}")
     meshes = _find_meshes(args.robot) if args.visuals == "drake_models" else []
-    usual = _DEMONSTRATIONS[args.robot]
-    library = ExperienceLibrary(args.library or shipped_library(usual.category))
+    library = ExperienceLibrary(args.library or shipped_library(usual.library))
     overrides = usual.overrides if args.set is None else args.set
-    scenario = parse_scenario(scenario_text(library.scenario()), overrides, source="--set")
-    result = demonstrate(scenario, library, args.method, args.seed, args.out, meshes=meshes)
+    if usual.library == category:
+        scenario = parse_scenario(scenario_text(library.scenario()), overrides, source="--set")
+    else:
+        scenario = load_scenario(category, overrides)
+    cameras = None if usual.cameras is None else load_cameras(usual.cameras)
+    result = demonstrate(
+        scenario, library, args.method, args.seed, args.out, meshes=meshes, cameras=cameras
+    )
     for kind, path in result.files.items():
         print(f"{kind}: {path}")
     return 0

@@ -11,10 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lic_drake.errors import LicError
+from lic_drake.evaluate.looking import Watch
+from lic_drake.evaluate.looking_pictures import LookingPictures
 from lic_drake.evaluate.pictures import AperturePictures, Pictures, PlanarPictures
 from lic_drake.evaluate.stills import save_stills
 from lic_drake.evaluate.trial import Attempt, run_trial
 from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.perception.config import CamerasConfig
 from lic_drake.reach.pointing_starts import PointingStarts
 from lic_drake.reach.request import IN_PLANE, ReachRecord, ReachRequest, is_within_reach
 from lic_drake.reach.rollout import make_record, simulate_request
@@ -36,11 +39,13 @@ class Demonstration:
     Attributes:
         p_WG: Goal, shape (3,), metres.
         attempts: The attempts in their order.
+        success: Whether the last of them came to the goal, or with cameras into the ball.
         files: What was written, by kind: recording, pictures and data.
     """
 
     p_WG: Vector
     attempts: list[Attempt]
+    success: bool
     files: dict[str, Path]
 
 
@@ -53,19 +58,23 @@ def demonstrate(
     attempts: int = 2,
     say: Callable[[str], None] = print,
     meshes: Sequence[LinkMesh] = (),
+    cameras: CamerasConfig | None = None,
 ) -> Demonstration:
     """Selects a start in an unseen environment, reaches, and tries again if that fails.
 
     Args:
-        scenario: The library's scenario.
+        scenario: Where to reach, the library's scenario or one with the same robot.
         library: Experience to learn from; its environments come from another seed stream.
         method: Strategy, see `lic_drake.select.registry.method_names`.
         seed: Chooses the environment and the goal.
         out: Folder for demo.html, demo.json, path.png, the stills of `save_stills` and, in the
-            plane, density.png, before a board of apertures apertures.png.
+            plane, density.png, before a board of apertures apertures.png; with cameras also
+            sequence.html, views.webp, look1.png and so on.
         attempts: How many reaches at the most.
         say: Gets a line for every step.
         meshes: What a PR2 wears in the pictures instead of the shapes of its model.
+        cameras: Cameras with which a PR2 has to find apertures and goal before every attempt; None:
+            it knows them.
 
     Raises:
         LicError: The folder cannot be written, or the method or library cannot be used.
@@ -80,13 +89,20 @@ def demonstrate(
     columns = library.columns()
     say(
         f"{scenario.category}, evaluation environment {seed}: goal at"
-        f" {_metres(p_WG[: instance.num_axes])} m; learning from {library.num_reaches} reaches"
+        f" {_metres(p_WG[:2] if arm.surface is None else p_WG)} m; learning from"
+        f" {library.num_reaches} reaches of {library.scenario().category}"
     )
     selector = _Talking(
         make_selector(method, arm, columns, np.random.default_rng(seed), scenario.category), say
     )
-    if isinstance(starts, PointingStarts):
-        pictures: Pictures = AperturePictures(scenario, instance, starts, p_WG, meshes)
+    watch = None
+    if cameras is not None:
+        watch = Watch(
+            scenario=scenario, stream="evaluation", environment=seed, p_WG=p_WG, cameras=cameras
+        )
+        pictures: Pictures = LookingPictures(instance, watch, meshes)
+    elif isinstance(starts, PointingStarts):
+        pictures = AperturePictures(scenario, instance, starts, p_WG, meshes)
     else:
         pictures = PlanarPictures(scenario, instance, starts, p_WG)
 
@@ -105,14 +121,36 @@ def demonstrate(
         )
         return record
 
-    done = run_trial(scenario, selector, "evaluation", seed, p_WG, attempts, reach=reach)
+    def look(number: int) -> tuple[Vector, Starts]:
+        assert watch is not None
+        belief = watch.belief(number)
+        off = 1000 * np.linalg.norm(belief.p_WG - p_WG)
+        say(
+            f"look {number + 1}: {len(belief.index)} of {len(belief.look.apertures.p_WA)} apertures"
+            f" look open, the ball is at {_metres(belief.p_WG)} m, which is"
+            f" {off:.0f} mm off"
+        )
+        return belief.p_WG, belief.starts
+
+    done = run_trial(
+        scenario,
+        selector,
+        "evaluation",
+        seed,
+        p_WG,
+        attempts,
+        reach=reach,
+        look=None if watch is None else look,
+    )
     chosen = selector.selector
     if not isinstance(chosen, LicSelector):  # Shows what LIC would have thought of the choices.
         chosen = make_selector("gp", arm, columns, category=scenario.category)
     assert isinstance(chosen, LicSelector)
     files = {**pictures.save(out, chosen, done), "data": out / "demo.json"}
     files |= save_stills(scenario, instance, p_WG, done, traces, out, say, meshes)
-    demonstration = Demonstration(p_WG=p_WG, attempts=done, files=files)
+    last = done[-1].record
+    success = last.success if watch is None else watch.touches_ball(last)
+    demonstration = Demonstration(p_WG=p_WG, attempts=done, success=success, files=files)
     _write_json(demonstration, method, seed)
     return demonstration
 
@@ -184,7 +222,7 @@ def _write_json(result: Demonstration, method: str, seed: int) -> None:
         "method": method,
         "seed": seed,
         "goal": result.p_WG.tolist(),
-        "success": result.attempts[-1].record.success,
+        "success": result.success,
         "attempts": [
             {
                 "start": attempt.selection.x0.tolist(),

@@ -46,7 +46,11 @@ def draw_apertures(ax: Axes, image: CameraImage, found: DetectedApertures) -> Ax
 
 
 def draw_passable_probability(
-    ax: Axes, image: CameraImage, found: DetectedApertures, probability: Vector
+    ax: Axes,
+    image: CameraImage,
+    found: DetectedApertures,
+    probability: Vector,
+    chosen: int | None = None,
 ) -> Axes:
     """Draws the passable-probability map: the whiter an aperture, the better (paper Fig. 2).
 
@@ -56,6 +60,7 @@ def draw_passable_probability(
         found: The apertures.
         probability: Estimated probability of reaching the goal through each of them, shape (n,);
             NaN where the arm cannot reach through, which is drawn as 0 without a number.
+        chosen: Index of an aperture that gets a frame.
 
     Raises:
         ValueError: Numbers of apertures and probabilities differ.
@@ -72,6 +77,9 @@ def draw_passable_probability(
         )
         if not np.isnan(value):
             _write(ax, image, centre, f"{value:.2f}", "black" if value > 0.5 else "white")
+    if chosen is not None:
+        outline = image.project(found.corners[chosen])
+        ax.add_patch(Polygon(outline, closed=True, fill=False, edgecolor="tab:cyan", lw=2.5))
     return ax
 
 

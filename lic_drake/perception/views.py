@@ -105,7 +105,11 @@ class CameraRig(NamedTuple):
 
 
 def add_rig(
-    builder: DiagramBuilder, instance: ClutterInstance, p_WG: Vector, cameras: CamerasConfig
+    builder: DiagramBuilder,
+    instance: ClutterInstance,
+    p_WG: Vector,
+    cameras: CamerasConfig,
+    mobile: bool = False,
 ) -> CameraRig:
     """Adds an environment, a ball at the goal, the robot where it looks from, and the cameras.
 
@@ -114,12 +118,13 @@ def add_rig(
         instance: The environment.
         p_WG: The goal, shape (3,), metres.
         cameras: The cameras.
+        mobile: Whether the robot's base and torso are joints.
 
     Raises:
         RenderingError: The renderer cannot work on this machine.
     """
     head = cameras.head
-    robot = LookingPr2(head.base_pose, head.torso_m, head.tilt_deg)
+    robot = LookingPr2(head.base_pose, head.torso_m, head.tilt_deg, mobile)
     scene = add_scene(builder, robot, instance, SceneConfig(), visuals=True)
     plant, scene_graph = scene.plant, scene.scene_graph
     scene_graph.AddRenderer(_RENDERER, make_renderer())

@@ -82,7 +82,7 @@ class Environment:
                 "invalid_start", ReachTrace(), "no configuration within the joint limits"
             )
         result = self._simulate(angles, p_RG, keep_states)
-        result.trace.translate(self.p_WR)
+        result.trace.translate(self.p_WR, objects_too=self.instance.stems is None)
         return result
 
     def _simulate(self, angles: Vector, p_RG: Vector, keep_states: bool) -> ReachResult:

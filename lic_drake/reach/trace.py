@@ -16,8 +16,9 @@ class SceneState(NamedTuple):
         q: Joint angles, shape (m,), radians.
         v: Joint velocities, shape (m,), rad/s.
         p_WO: Positions of the movable objects along the axes in which they move, shape (n, 2) in
-            the plane and (n, 3) in space, metres.
-        v_WO: Their velocities, of the same shape, m/s.
+            the plane and (n, 3) in space, metres; of stems the angles by which they are bent,
+            shape (n, 2), radians.
+        v_WO: Their velocities, of the same shape, m/s or rad/s.
     """
 
     q: Vector
@@ -62,11 +63,18 @@ class ReachTrace:
         self.total_force.append(float(taxel_force.sum()))
         self.contacts.append(int(np.count_nonzero(taxel_force)))
 
-    def translate(self, offset: Vector) -> None:
-        """Moves all positions by an offset, shape (3,), metres."""
+    def translate(self, offset: Vector, objects_too: bool = True) -> None:
+        """Moves all positions by an offset, shape (3,), metres.
+
+        Args:
+            offset: Shape (3,), metres.
+            objects_too: Whether p_WO are positions; those of stems are angles.
+        """
         self.p_WE = [p_WE + offset for p_WE in self.p_WE]
-        self.states = [s._replace(p_WO=s.p_WO + offset[: s.p_WO.shape[1]]) for s in self.states]
         self.p_WR = self.p_WR + offset
+        if not objects_too:
+            return
+        self.states = [s._replace(p_WO=s.p_WO + offset[: s.p_WO.shape[1]]) for s in self.states]
         if self.p_WO is not None:
             self.p_WO = self.p_WO + offset[: self.p_WO.shape[1]]
 

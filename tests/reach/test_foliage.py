@@ -56,6 +56,20 @@ def test_a_reach_finds_stems_upright_again_and_is_the_same(
     np.testing.assert_array_equal(again.trace.peak_force, result.trace.peak_force)
 
 
+def test_stems_are_bent_the_same_wherever_the_base_stands(result: ReachResult) -> None:
+    aside = np.array([0.0, 0.25, 0.0])
+    moved = Environment(SCENARIO, INSTANCE.translated(aside), p_WR=aside)
+    x0 = X0.copy()
+    x0[:3] += aside
+    there = moved.reach(GOAL + aside, x0, keep_states=True)
+    assert there.outcome == result.outcome
+    # To rounding, which contact makes more of.
+    for k in (0, 20, 40):
+        np.testing.assert_allclose(there.trace.p_WE[k], result.trace.p_WE[k] + aside, atol=1e-6)
+        here, far = result.trace.states[k].p_WO, there.trace.states[k].p_WO
+        np.testing.assert_allclose(far, here, atol=1e-6)
+
+
 def test_a_reach_ends_as_if_no_stem_had_slept(result: ReachResult) -> None:
     awake = Environment(SCENARIO, INSTANCE, sleep=False).reach(GOAL, X0, keep_states=True)
     assert awake.outcome == result.outcome
