@@ -32,6 +32,7 @@ tables: $(STAMP)
 	$(PYTHON_IN_VENV) scripts/tabulate_bounds.py
 	$(PYTHON_IN_VENV) scripts/tabulate_second_attempts.py
 	$(PYTHON_IN_VENV) scripts/table_pr2.py
+	$(PYTHON_IN_VENV) scripts/table_foliage.py
 	$(PYTHON_IN_VENV) scripts/make_figures.py
 
 # The records themselves, from nothing in some hours; interrupted, it goes on where it was. What is

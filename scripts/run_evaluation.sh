@@ -60,3 +60,15 @@ evaluate_pr2() {
 }
 evaluate_pr2
 evaluate_pr2 --still --variant still
+
+# Before foliage: apertures and goal seen by cameras or known; learned among spheres or foliage.
+evaluate_foliage() {
+    library=$1 variant=$2
+    shift 2
+    lic evaluate "$results/foliage-aperture-clutter" --library "models/experience/$library" \
+        --scenario foliage-aperture-clutter --environments 100 --goals 1 --variant "$variant" "$@"
+}
+evaluate_foliage sphere-aperture-clutter cameras --cameras foliage --methods rnd cost gp
+evaluate_foliage sphere-aperture-clutter known --methods rnd cost gp
+evaluate_foliage foliage-aperture-clutter cameras-foliage --cameras foliage --methods gp
+evaluate_foliage foliage-aperture-clutter known-foliage --methods gp
