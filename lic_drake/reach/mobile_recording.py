@@ -25,6 +25,8 @@ Vector = NDArray[np.float64]
 MOVE_S = 1.0
 """How long base, torso and arm each take to their places in the recording, seconds."""
 
+_FORCES = "/drake/contact_forces"
+
 RETRACT_SPEED = 4.0
 """So many times faster than it came in the arm goes back."""
 
@@ -72,6 +74,7 @@ class MobileRecording(MeshcatRecording):
         self._b0 = np.array([0.0, 0.0, scenario.task.torso_m])
         self._q = arm.q_home
         self._home = arm.q_home
+        self._springs_back = instance.stems is not None
         self._draw(self._b0, self._q)
 
     def move_to(self, b0: Vector, q: Vector) -> None:
@@ -94,6 +97,7 @@ class MobileRecording(MeshcatRecording):
             b0: Place of the base and height of the torso, shape (3,), metres.
         """
         self._draw_goal(p_WG)
+        self._show_forces(True)
         begin = self._clock_s
         for k in range(0, len(trace.states), self._sample_steps()):
             state = trace.states[k]
@@ -104,12 +108,24 @@ class MobileRecording(MeshcatRecording):
         self._clock_s = math.ceil(self._clock_s + 1.0)
 
     def retract(self, trace: ReachTrace) -> None:
-        """Records the arm going back the way it came, and to a posture between reaches."""
+        """Records the arm going back the way it came, and to a posture between reaches.
+
+        Stems go back with it, as they do when nothing holds them any more.
+        """
+        self._show_forces(False)
         step = round(RETRACT_SPEED * self._sample_steps())
-        for q in trace.q[::-step]:
-            self._draw(self._b0, q)
+        for state in [*trace.states[::-step], *trace.states[:1]]:
+            if self._springs_back:
+                self._plant.SetPositions(
+                    self._plant_context, self._scene.clutter, state.p_WO.ravel()
+                )
+            self._draw(self._b0, state.q)
             self._clock_s += 1.0 / self._frames_per_second
         self._blend(self._b0, self._home)
+
+    def _show_forces(self, shown: bool) -> None:
+        """Shows contact forces from now on, or not: between reaches nothing is simulated."""
+        self._meshcat.SetProperty(_FORCES, "visible", shown, self._clock_s)
 
     def _blend(self, b0: Vector, q: Vector) -> None:
         """Records a move on a straight line, slow at its ends; none if it is there already."""
