@@ -148,15 +148,15 @@ class LocalEstimator:
         near = self._fitted()
         Z, f = checked_rows(Z, f)
         checked_queries(Z, near.Z.shape[1])
-        joined = {
-            "Z": np.vstack([near.Z, Z]),
-            "f": np.concatenate([near.f, f]),
-            "environment": np.concatenate([near.environment, np.full(len(f), -1)]),
-            "weight": np.concatenate([near.weight, checked_weights(weight, len(f))]),
-        }
-        count = len(joined["f"])
+        count = len(near.f) + len(f)
         order = make_generator("training", "order of local rows").permutation(count)
-        self._near = replace(near, **{name: values[order] for name, values in joined.items()})
+        self._near = replace(
+            near,
+            Z=np.vstack([near.Z, Z])[order],
+            f=np.concatenate([near.f, f])[order],
+            environment=np.concatenate([near.environment, np.full(len(f), -1)])[order],
+            weight=np.concatenate([near.weight, checked_weights(weight, len(f))])[order],
+        )
         self._cache.clear()
         return self
 
@@ -206,9 +206,7 @@ class LocalEstimator:
             if len(self._cache) >= _CACHE_SIZE:
                 del self._cache[next(iter(self._cache))]
             rows = near.nearest(cell, self.size)
-            self._cache[key] = model.conditioned_on(
-                near.Z[rows], near.f[rows], near.weight[rows]
-            )
+            self._cache[key] = model.conditioned_on(near.Z[rows], near.f[rows], near.weight[rows])
         return self._cache[key]
 
     def _fitted(self) -> Neighbourhoods:

@@ -158,6 +158,4 @@ class NearestNeighbours:
 
 def _index(rows: AveragedRows, bandwidth: Vector) -> _Points:
     points = rows.Z / bandwidth
-    return _Points(
-        tree=cKDTree(points), Z=rows.Z, points=points, rate=rows.rate, count=rows.count
-    )
+    return _Points(tree=cKDTree(points), Z=rows.Z, points=points, rate=rows.rate, count=rows.count)

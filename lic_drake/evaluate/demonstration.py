@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from lic_drake.errors import LicError
 from lic_drake.evaluate.pictures import AperturePictures, Pictures, PlanarPictures
 from lic_drake.evaluate.trial import Attempt, run_trial
+from lic_drake.experience.added import added_columns
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.pointing_starts import PointingStarts
 from lic_drake.reach.request import IN_PLANE, ReachRecord, ReachRequest, is_within_reach
@@ -72,13 +73,16 @@ def demonstrate(
     starts = make_starts(scenario, instance)
     draws = (scenario.sample_goal("evaluation", seed, index) for index in itertools.count())
     p_WG = next(goal for goal in draws if _can_be_reached(scenario, starts, goal))
-    columns = library.columns()
+    columns, added = library.columns(), added_columns(library)
     say(
         f"{scenario.category}, evaluation environment {seed}: goal at"
         f" {_metres(p_WG[: instance.num_axes])} m; learning from {library.num_reaches} reaches"
     )
     selector = _Talking(
-        make_selector(method, arm, columns, np.random.default_rng(seed), scenario.category), say
+        make_selector(
+            method, arm, columns, np.random.default_rng(seed), scenario.category, added=added
+        ),
+        say,
     )
     if isinstance(starts, PointingStarts):
         pictures: Pictures = AperturePictures(scenario, instance, starts, p_WG)
@@ -100,7 +104,7 @@ def demonstrate(
     done = run_trial(scenario, selector, "evaluation", seed, p_WG, attempts, reach=reach)
     chosen = selector.selector
     if not isinstance(chosen, LicSelector):  # Shows what LIC would have thought of the choices.
-        chosen = make_selector("gp", arm, columns, category=scenario.category)
+        chosen = make_selector("gp", arm, columns, category=scenario.category, added=added)
     assert isinstance(chosen, LicSelector)
     files = {**pictures.save(out, chosen, done), "data": out / "demo.json"}
     demonstration = Demonstration(p_WG=p_WG, attempts=done, files=files)
