@@ -80,20 +80,26 @@ class FinalPositions:
         seen = fold[tried][:, None] != fold
         return max(candidates, key=lambda c: c._log_density(c.Z[tried], p_RE[tried], seen).sum())
 
-    def log_density(self, z: ArrayLike, p_RE: ArrayLike) -> float:
-        """Returns log p(x_inf | failure, z), of a density in 1/m^2.
+    def log_density(self, z: ArrayLike, p_RE: ArrayLike) -> Vector:
+        """Returns log p(x_inf | failure, z) at m positions, shape (m,), of a density in 1/m^2.
 
         Args:
             z: Features of LIC-1 of the failed reach, shape (d,).
-            p_RE: Where it ended, in the robot's frame, shape (2,), metres.
+            p_RE: Positions in the robot's frame, shape (m, 2), metres.
         """
         query = np.atleast_2d(np.asarray(z, dtype=float)) / self.scale
-        return float(self._log_density(query, np.atleast_2d(p_RE))[0])
+        return self._log_density(query, np.asarray(p_RE, dtype=float))
 
     def _log_density(
         self, queries: Vector, p_RE: Vector, seen: NDArray[np.bool_] | None = None
     ) -> Vector:
-        """Returns the logarithms for m queries in widths, learning from what each may see."""
+        """Returns the logarithms for m queries in widths, or one for all m positions.
+
+        Args:
+            queries: Shape (m, d) or (1, d).
+            p_RE: Shape (m, 2).
+            seen: What each query may learn from, shape (m, n); by default all.
+        """
         log_weight = -0.5 * cdist(queries, self.Z, "sqeuclidean")
         if seen is not None:
             log_weight = np.where(seen, log_weight, -np.inf)

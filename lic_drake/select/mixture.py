@@ -163,5 +163,5 @@ def log_likelihood(category: Category, before: Situation, failed: FailedReach) -
     p_WE = np.array([failed.shown.get(f"final_{axis}", np.nan) for axis in "xy"])
     if category.final is not None and np.all(np.isfinite(p_WE)):
         z = category.lic.first.features.join(before.p_WG - start.b0[0], start.in_R[0])
-        result += category.final.log_density(z, p_WE - failed.p_WR)
+        result += category.final.log_density(z, (p_WE - failed.p_WR)[None])[0]
     return float(result)
