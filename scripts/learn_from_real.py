@@ -41,13 +41,16 @@ def main() -> int:
     parser.add_argument("--records", type=int, default=2000, help="records of the real robot")
     parser.add_argument("--sizes", type=int, nargs="+", default=[100, 300, 1000, 2000])
     parser.add_argument("--weights", type=float, nargs="+", default=[1.0, 8.0])
+    parser.add_argument(
+        "--alone", type=int, nargs="*", default=[300, 2000], help="sizes without the simulation"
+    )
     parser.add_argument("--environments", type=int, default=300, help="goals at each point")
     parser.add_argument("--workers", type=int, default=1)
     args = parser.parse_args()
     folder = args.results / "real_experience"
-    weights = [*args.weights, None]
-    points = [Learned(records=n, weight=w) for w in weights for n in args.sizes]
-    points.insert(0, Learned(records=0, weight=1.0))
+    points = [Learned(records=0, weight=1.0)]
+    points += [Learned(records=n, weight=w) for w in args.weights for n in args.sizes]
+    points += [Learned(records=n, weight=None) for n in args.alone]
     simulated = ExperienceLibrary(shipped_library(CATEGORY))
     evaluation = Evaluation(
         experience=simulated.path,

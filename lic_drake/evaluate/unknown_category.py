@@ -64,9 +64,7 @@ class Comparison:
         return parse_scenario(text, COMMON_STARTS, source="the common starts")
 
 
-def make_strategies(
-    comparison: Comparison, estimator: str = "gp"
-) -> dict[str, dict[str, Selector]]:
+def make_strategies(comparison: Comparison, estimator: str) -> dict[str, dict[str, Selector]]:
     """Returns the strategies of `NAMES` by the category that the environment truly is of.
 
     Raises:
@@ -117,6 +115,7 @@ def compare(
     environments: Sequence[int],
     say: Callable[[str], None] = print,
     reach: Callable[[ReachRequest], ReachRecord] = run_reach,
+    estimator: str = "gp",
 ) -> tuple[list[TrialRow], dict[str, dict[str, list[float]]]]:
     """Makes two attempts with every strategy in environments of both categories.
 
@@ -127,13 +126,14 @@ def compare(
         environments: Indices of the environments, the same in both categories.
         say: Gets a line now and then.
         reach: Makes a request's reach.
+        estimator: Of LIC.
 
     Returns:
         The rows of the trials, of which the variant is the true category, and what the mixtures
         that are updated believed of the true category after a first failure, by strategy and true
         category.
     """
-    strategies = make_strategies(comparison)
+    strategies = make_strategies(comparison, estimator)
     goals = comparison.scenario(comparison.goals_of)
     rows: list[TrialRow] = []
     beliefs: dict[str, dict[str, list[float]]] = {
