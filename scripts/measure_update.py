@@ -12,8 +12,8 @@ import numpy as np
 
 from lic_drake.estimate.categories import features_of
 from lic_drake.estimate.features import ExperienceRows
-from lic_drake.evaluate.real_experience import time_update, update_table
 from lic_drake.evaluate.report import run_script, write_table_files
+from lic_drake.evaluate.update_time import time_update, update_table
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 

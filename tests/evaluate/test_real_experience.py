@@ -4,13 +4,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from fake_reach import make_record
 from matplotlib.figure import Figure
 
 from lic_drake.errors import LibraryError
-from lic_drake.estimate.features import PLANAR_LIC1
 from lic_drake.evaluate import experiment
 from lic_drake.evaluate.batch import random_requests
 from lic_drake.evaluate.experiment import Evaluation
@@ -20,7 +18,6 @@ from lic_drake.evaluate.real_experience import (
     evaluate_learned,
     real_experience_table,
     success_by_records,
-    time_update,
 )
 from lic_drake.evaluate.statistics import Count
 from lic_drake.evaluate.trials import TrialTable, read_trials
@@ -128,12 +125,3 @@ def test_the_figure_has_a_line_for_each_weight_that_begins_at_the_simulation() -
     assert lines["simulation and records of weight 1"].get_ydata().tolist() == [20.0, 30.0]
     assert lines["simulation and records of weight 8"].get_ydata().tolist() == [20.0, 35.0]
     assert lines["real records only"].get_ydata().tolist() == [25.0]
-
-
-def test_an_update_is_timed_against_what_gives_the_same(real: ExperienceLibrary) -> None:
-    rows = PLANAR_LIC1.rows(real.columns())
-    time = time_update(rows, replace(rows, Z=rows.Z + 0.01, weight=3.0))
-    assert time.records == 120
-    assert 0.0 < time.update_s < time.fit_s
-    assert time.difference < 1e-9
-    assert np.isfinite(time.condition_s)
