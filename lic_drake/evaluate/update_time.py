@@ -7,8 +7,10 @@ from time import process_time
 
 import numpy as np
 
+from lic_drake.estimate.averaging import AveragedRows, average_rows
 from lic_drake.estimate.features import ExperienceRows
 from lic_drake.estimate.gaussian_process import GaussianProcess
+from lic_drake.estimate.posterior import condition
 from lic_drake.evaluate.table import Table
 
 
@@ -39,16 +41,21 @@ def time_update(rows: ExperienceRows, added: ExperienceRows) -> UpdateTime:
     process = GaussianProcess().fit(rows.Z, rows.f, rows.environment)
     environment = np.concatenate([rows.environment, added.environment + 1 + rows.environment.max()])
     Z, f = np.vstack([rows.Z, added.Z]), np.concatenate([rows.f, added.f])
-    weight = np.concatenate([np.ones(len(rows.f)), np.broadcast_to(added.weight, len(added.f))])
+    weight = np.broadcast_to(added.weight, len(added.f))
     fit_s, _ = _shortest(lambda: GaussianProcess().fit(Z, f, environment), 1)
-    condition_s, whole = _shortest(lambda: process.conditioned_on(Z, f, weight))
+    condition_s, whole = _shortest(
+        lambda: condition(
+            _side_by_side(average_rows(rows.Z, rows.f), average_rows(added.Z, added.f, weight)),
+            process.hyperparameters,
+        )
+    )
     update_s, updated = _shortest(lambda: copy(process).update(added.Z, added.f, added.weight))
     return UpdateTime(
         records=len(added.f),
         fit_s=fit_s,
         condition_s=condition_s,
         update_s=update_s,
-        difference=float(np.abs(whole.values(Z) - updated.values(Z)).max()),
+        difference=float(np.abs(whole.mean(Z) - updated.values(Z)).max()),
     )
 
 
@@ -72,6 +79,16 @@ def update_table(times: Sequence[UpdateTime], reaches: int) -> Table:
             )
             for time in times
         ),
+    )
+
+
+def _side_by_side(a: AveragedRows, b: AveragedRows) -> AveragedRows:
+    """Returns rows followed by others, equal ones not averaged."""
+    return AveragedRows(
+        Z=np.vstack([a.Z, b.Z]),
+        rate=np.concatenate([a.rate, b.rate]),
+        count=np.concatenate([a.count, b.count]),
+        member=np.concatenate([a.member, len(a.Z) + b.member]),
     )
 
 
