@@ -25,7 +25,7 @@ from lic_drake.evaluate.real_experience import (
     success_by_records,
 )
 from lic_drake.evaluate.report import RESULTS, write_table_files
-from lic_drake.evaluate.statistics import Count
+from lic_drake.evaluate.statistics import count
 from lic_drake.evaluate.trials import TrialTable, read_trials
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
@@ -46,6 +46,9 @@ def main() -> int:
     )
     parser.add_argument("--environments", type=int, default=300, help="goals at each point")
     parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument(
+        "--tabulate", action="store_true", help="only table and figure, of what was tried before"
+    )
     args = parser.parse_args()
     folder = args.results / "real_experience"
     points = [Learned(records=0, weight=1.0)]
@@ -63,14 +66,16 @@ def main() -> int:
     )
     try:
         scenario, real = evaluation.scenario(), ExperienceLibrary(folder / "records")
-        real.create()
-        requests = random_requests(scenario, "training", args.records, 1)
-        records = simulate_requests(requests, real, scenario, args.workers, print)
-        random = Count(sum(records[r.key].success for r in requests), len(requests))
-        for point in points:
-            print(point.variant, flush=True)
-            evaluate_learned(point, simulated, real, evaluation, args.workers)
-        counts = success_by_records(TrialTable(read_trials(evaluation.trials_path)), METHOD, points)
+        if not args.tabulate:
+            real.create()
+            requests = random_requests(scenario, "training", args.records, 1)
+            simulate_requests(requests, real, scenario, args.workers, print)
+            for point in points:
+                print(point.variant, flush=True)
+                evaluate_learned(point, simulated, real, evaluation, args.workers)
+        trials = TrialTable(read_trials(evaluation.trials_path))
+        counts = success_by_records(trials, METHOD, points)
+        random = count(real.columns()["success"].astype(bool))
         caption = (
             f"First attempts in {CATEGORY} whose walls run -10 to 10 degrees from +x, after"
             " learning from a simulation in which they run 5 to 35 degrees from it and from"
