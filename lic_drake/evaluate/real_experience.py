@@ -149,10 +149,9 @@ def draw_success_by_records(ax: Axes, counts: dict[Learned, Count], random: Coun
     sizes = sorted({point.records for point in counts})
     ax.set_xticks(sizes, [str(size) for size in sizes])
     ax.minorticks_off()
-    ax.set_xlabel("records of the real robot")
-    ax.set_ylabel("success of LIC-1, %")
-    ax.set_ylim(bottom=0.0)
-    ax.legend()
+    ax.set_xlim(-15.0, 1.2 * max(sizes))
+    ax.set(ylim=(0.0, None), xlabel="records of the real robot", ylabel="success of LIC-1 [%]")
+    ax.legend(fontsize=8, loc="lower right")
     return ax
 
 
