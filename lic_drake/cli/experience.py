@@ -1,4 +1,4 @@
-"""`lic experience`: looks at, checks, recomputes and merges experience libraries."""
+"""`lic experience`: looks at, checks, recomputes, merges and adds to experience libraries."""
 
 import argparse
 import dataclasses
@@ -9,7 +9,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lic_drake.cli import exit_codes
+from lic_drake.cli import add_to_library, exit_codes
 from lic_drake.cli.arguments import Subparsers, add_json_argument, positive_int
 
 if TYPE_CHECKING:
@@ -21,9 +21,9 @@ def add_parser(subparsers: Subparsers) -> None:
     """Adds the subcommand to the command line."""
     parser = subparsers.add_parser(
         "experience",
-        help="look at, check, recompute or merge experience libraries",
-        description="Looks at, checks, recomputes or merges experience libraries: folders of"
-        " Parquet files with one row per reach, which also open in pandas.",
+        help="look at, check, recompute, merge or add to experience libraries",
+        description="Looks at, checks, recomputes, merges or adds to experience libraries: folders"
+        " of Parquet files with one row per reach, which also open in pandas.",
         epilog="example: lic experience info out/cylinder",
     )
     actions = parser.add_subparsers(title="actions", metavar="ACTION", required=True)
@@ -31,6 +31,7 @@ def add_parser(subparsers: Subparsers) -> None:
     _add_check(actions)
     _add_recompute(actions)
     _add_merge(actions)
+    add_to_library.add_parser(actions)
 
 
 def _add_info(actions: Subparsers) -> None:
@@ -93,7 +94,8 @@ def _add_merge(actions: Subparsers) -> None:
         "merge",
         help="merge libraries of one scenario into one file",
         description="Writes all reaches of libraries of one scenario into one Parquet file, which"
-        " is a library of its own. Equal duplicates are written once, unequal ones refused.",
+        " is a library of its own. Equal duplicates are written once, unequal ones refused."
+        " Records that were added from elsewhere stay where they are.",
         epilog="example: lic experience merge out/all.parquet out/machine-1 out/machine-2",
     )
     parser.add_argument("output", metavar="OUTPUT", type=Path, help="new .parquet file")
@@ -117,6 +119,7 @@ def run_info(args: argparse.Namespace) -> int:
     summary = summarize(ExperienceLibrary(args.library))
     if args.json:
         values = {**dataclasses.asdict(summary), "success_rate": summary.success_rate}
+        values["added"] = [addition.values() for addition in summary.added]
         print(json.dumps(values, indent=2))
     else:
         print("\n".join(_lines(args.library, summary)))
@@ -172,6 +175,7 @@ def _check_lines(report: "LibraryReport", library: Path, is_own: bool) -> list[s
         f"reaches     {report.reaches} in {report.shards} files",
         f"journals    {report.journalled} more reaches of tasks at work or interrupted"
         + (f"; {report.lost_lines} damaged lines" if report.lost_lines else ""),
+        *([f"added       {report.added} records from elsewhere"] if report.added else []),
         f"missing     {_missing(report)}",
         f"scenarios   {', '.join(report.scenarios) or 'none'}",
         f"duplicates  {len(report.duplicates)} {' '.join(report.duplicates[:5])}".rstrip(),
@@ -228,4 +232,5 @@ def _lines(library: Path, summary: "LibrarySummary") -> list[str]:
         f" {summary.wall_time_s / 3600.0:.3g} h of wall time",
         f"simulated by  lic_drake {', '.join(summary.lic_drake_versions)};"
         f" Drake {', '.join(summary.drake_versions)}",
+        *(f"added         {addition.describe()}" for addition in summary.added),
     ]

@@ -19,7 +19,7 @@ class AveragedRows:
     Attributes:
         Z: Features, shape (m, d), in lexicographic order.
         rate: Share of successes, shape (m,).
-        count: Number of reaches, shape (m,).
+        count: Number of reaches, or the sum of their weights, shape (m,).
         member: Index among the m of each reach, shape (n,).
     """
 
@@ -29,14 +29,21 @@ class AveragedRows:
     member: NDArray[np.intp]
 
 
-def average_rows(Z: Vector, f: Vector) -> AveragedRows:
-    """Averages f, shape (n,), over equal rows of Z, shape (n, d)."""
+def average_rows(Z: Vector, f: Vector, weight: Vector | None = None) -> AveragedRows:
+    """Averages f, shape (n,), over equal rows of Z, shape (n, d).
+
+    Args:
+        Z: Features.
+        f: Successes, or rates.
+        weight: How many reaches each row counts as, shape (n,), by default one.
+    """
+    weight = np.ones(len(Z)) if weight is None else weight
     order = np.lexsort(Z.T[::-1])
     sorted_Z = Z[order]
     is_first = np.r_[True, np.any(sorted_Z[1:] != sorted_Z[:-1], axis=1)]
     first = np.flatnonzero(is_first)
-    count = np.diff(np.r_[first, len(Z)]).astype(float)
-    rate = np.add.reduceat(f[order], first) / count
+    count = np.add.reduceat(weight[order], first)
+    rate = np.add.reduceat((weight * f)[order], first) / count
     member = np.empty(len(Z), dtype=np.intp)
     member[order] = np.cumsum(is_first) - 1
     return AveragedRows(Z=sorted_Z[first], rate=rate, count=count, member=member)

@@ -45,6 +45,22 @@ def checked_rows(Z: ArrayLike, f: ArrayLike) -> tuple[Vector, Vector]:
     return Z + 0.0, f
 
 
+def checked_weights(weight: ArrayLike, num_rows: int) -> Vector:
+    """Returns the weights of rows, shape (num_rows,); a single one counts for all of them.
+
+    Raises:
+        EstimateError: Another number of weights than rows, or one that is not above zero.
+    """
+    weight = np.asarray(weight, dtype=np.float64)
+    if weight.shape not in ((), (num_rows,)):
+        raise EstimateError(
+            f"weights need one number, or one for each of {num_rows} rows, got {weight.shape}"
+        )
+    if not np.all(np.isfinite(weight) & (weight > 0.0)):
+        raise EstimateError(f"weights must be positive numbers, got {np.min(weight)}")
+    return np.broadcast_to(weight, (num_rows,)).copy()
+
+
 def checked_queries(Z: ArrayLike, num_features: int) -> Vector:
     """Returns query rows, shape (n, d), as an array of floats.
 

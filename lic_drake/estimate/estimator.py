@@ -1,7 +1,7 @@
 """What every success estimator offers."""
 
 from dataclasses import dataclass
-from typing import Protocol, Self
+from typing import Protocol, Self, runtime_checkable
 
 from numpy.typing import ArrayLike
 
@@ -69,5 +69,23 @@ class SuccessEstimator(Predictor, Protocol):
 
         Raises:
             EstimateError: Not fitted yet, or a query that does not fit.
+        """
+        ...
+
+
+@runtime_checkable
+class UpdatableEstimator(SuccessEstimator, Protocol):
+    """An estimator that goes on learning: what it learned from before is kept (paper VII)."""
+
+    def update(self, Z: ArrayLike, f: ArrayLike, weight: ArrayLike = 1.0) -> Self:
+        """Takes further rows in and returns itself; its settings stay as `fit` chose them.
+
+        Args:
+            Z: Features, shape (n, d).
+            f: Successes, shape (n,), each 0 or 1.
+            weight: How many of the reaches of `fit` a row counts as, one number or shape (n,).
+
+        Raises:
+            EstimateError: Not fitted yet, or the rows or weights are unusable.
         """
         ...

@@ -25,11 +25,13 @@ class ExperienceRows:
         Z: Features, shape (n, d).
         f: Successes, shape (n,), each 0 or 1.
         environment: Number that stands for each reach's environment, shape (n,).
+        weight: How many simulated reaches each counts as, shape (n,), or one number for all.
     """
 
     Z: Vector
     f: Vector
     environment: NDArray[np.int64]
+    weight: Vector | float = 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,7 +98,7 @@ class FeatureMap:
         Args:
             columns: Arrays of equal length named as the fields of `ReachRecord`; with observed
                 features those of `lic_drake.experience.second_reach.pair_reaches`. Without
-                base_x, base_y and torso they are 0.
+                base_x, base_y and torso they are 0, without weight it is 1.
 
         Raises:
             EstimateError: A column is missing.
@@ -117,6 +119,7 @@ class FeatureMap:
             Z=Z - b0 @ self._base_selection(self.names).T,
             f=np.asarray(columns["success"], dtype=float),
             environment=environment,
+            weight=np.asarray(columns["weight"], dtype=float) if "weight" in columns else 1.0,
         )
 
     def join(self, p_RG: ArrayLike, x0: ArrayLike, observed: ArrayLike | None = None) -> Vector:

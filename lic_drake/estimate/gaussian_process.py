@@ -8,7 +8,13 @@ from numpy.typing import ArrayLike, NDArray
 from threadpoolctl import threadpool_limits
 
 from lic_drake.estimate.averaging import AveragedRows, average_rows, reach_variance
-from lic_drake.estimate.checks import EstimateError, Vector, checked_queries, checked_rows
+from lic_drake.estimate.checks import (
+    EstimateError,
+    Vector,
+    checked_queries,
+    checked_rows,
+    checked_weights,
+)
 from lic_drake.estimate.estimator import Prediction
 from lic_drake.estimate.folds import selection_folds
 from lic_drake.estimate.likelihood import Hyperparameters, fit_hyperparameters
@@ -72,18 +78,37 @@ class GaussianProcess:
                 fold = selection_folds(environment, len(f))
                 hyperparameters = self._choose_hyperparameters(Z, f, fold)
             rows = self._rows(Z, f)
-            if len(rows.Z) > _MAX_ROWS:
-                raise EstimateError(
-                    f"an exact Gaussian process takes at most {_MAX_ROWS} distinct rows, got"
-                    f" {len(rows.Z)}; use the estimator 'gp-raw' or 'knn'"
-                )
+            _refuse_too_many(len(rows.Z))
             self._posterior = condition(rows, hyperparameters)
         return self
 
-    def conditioned_on(self, Z: ArrayLike, f: ArrayLike) -> "GaussianProcess":
+    def update(self, Z: ArrayLike, f: ArrayLike, weight: ArrayLike = 1.0) -> Self:
+        """Takes further rows in; see `UpdatableEstimator`.
+
+        A row of weight w has the w-th part of a reach's noise variance. Hyper-parameters stay, and
+        the posterior is that of all rows at once. Rows of the same features are averaged among
+        those of one update, not with earlier ones: the noise floor counts once for each.
+        """
+        posterior = self._fitted()
+        Z, f = checked_rows(Z, f)
+        checked_queries(Z, posterior.Z.shape[1])
+        rows = self._rows(Z, f, checked_weights(weight, len(f)))
+        _refuse_too_many(len(posterior.Z) + len(rows.Z))
+        with threadpool_limits(limits=1, user_api="blas"):
+            self._posterior = posterior.extended(rows)
+        return self
+
+    def conditioned_on(
+        self, Z: ArrayLike, f: ArrayLike, weight: ArrayLike = 1.0
+    ) -> "GaussianProcess":
         """Returns a process with these hyper-parameters that has seen other rows only."""
         other = GaussianProcess(average=self.average, hyperparameters=self.hyperparameters)
-        return other.fit(Z, f)
+        Z, f = checked_rows(Z, f)
+        rows = other._rows(Z, f, checked_weights(weight, len(f)))
+        _refuse_too_many(len(rows.Z))
+        with threadpool_limits(limits=1, user_api="blas"):
+            other._posterior = condition(rows, self.hyperparameters)
+        return other
 
     def predict(self, Z: ArrayLike) -> Prediction:
         """Estimates P(success) for queries Z, shape (n, d); see `Predictor`."""
@@ -109,10 +134,11 @@ class GaussianProcess:
             checked_queries(np.atleast_2d(z), posterior.Z.shape[1])[0]
         )
 
-    def _rows(self, Z: Vector, f: Vector) -> AveragedRows:
+    def _rows(self, Z: Vector, f: Vector, weight: Vector | None = None) -> AveragedRows:
         if self.average:
-            return average_rows(Z, f)
-        return AveragedRows(Z=Z, rate=f, count=np.ones(len(f)), member=np.arange(len(f)))
+            return average_rows(Z, f, weight)
+        count = np.ones(len(f)) if weight is None else weight
+        return AveragedRows(Z=Z, rate=f, count=count, member=np.arange(len(f)))
 
     def _choose_hyperparameters(
         self, Z: Vector, f: Vector, fold: NDArray[np.intp]
@@ -145,3 +171,11 @@ class GaussianProcess:
         if self._posterior is None:
             raise EstimateError("the Gaussian process has no rows yet; call fit(Z, f) first")
         return self._posterior
+
+
+def _refuse_too_many(rows: int) -> None:
+    if rows > _MAX_ROWS:
+        raise EstimateError(
+            f"an exact Gaussian process takes at most {_MAX_ROWS} distinct rows, got {rows};"
+            " use the estimator 'gp-raw' or 'knn'"
+        )

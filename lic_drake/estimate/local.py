@@ -1,7 +1,7 @@
 """Local sub-sampling: an estimator fitted on the nearest samples only (paper III-D, [15])."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol, Self
 
 import numpy as np
@@ -9,7 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from lic_drake.estimate.averaging import average_rows
 from lic_drake.estimate.bandwidth import select_bandwidths
-from lic_drake.estimate.checks import EstimateError, Vector, checked_queries, checked_rows
+from lic_drake.estimate.checks import (
+    EstimateError,
+    Vector,
+    checked_queries,
+    checked_rows,
+    checked_weights,
+)
 from lic_drake.estimate.estimator import Prediction, SuccessEstimator
 from lic_drake.estimate.folds import selection_folds
 from lic_drake.seeds import make_generator
@@ -27,7 +33,8 @@ class Neighbourhoods:
     Attributes:
         Z: Features, shape (n, d).
         f: Successes, shape (n,).
-        environment: Environment of each row, shape (n,).
+        environment: Environment of each row, shape (n,); -1 for rows that were added later.
+        weight: How many reaches each row counts as, shape (n,).
         situation: The part of z that says how near a row is.
         length_scale: How far rows speak for each other along each feature, shape (d,): the
             bandwidths of neighbours that best predict environments that were held out.
@@ -36,6 +43,7 @@ class Neighbourhoods:
     Z: Vector
     f: Vector
     environment: NDArray[np.int64]
+    weight: Vector
     situation: slice
     length_scale: Vector
 
@@ -65,7 +73,9 @@ class Neighbourhoods:
 class LocalModel(Protocol):
     """The settings of an estimator, which it keeps whatever rows it is given."""
 
-    def conditioned_on(self, Z: ArrayLike, f: ArrayLike) -> SuccessEstimator:
+    def conditioned_on(
+        self, Z: ArrayLike, f: ArrayLike, weight: ArrayLike = 1.0
+    ) -> SuccessEstimator:
         """Returns an estimator with these settings that has seen the given rows only."""
         ...
 
@@ -125,10 +135,28 @@ class LocalEstimator:
             Z=Z,
             f=f,
             environment=known,
+            weight=np.ones(len(f)),
             situation=self._situation,
             length_scale=select_bandwidths(average_rows(Z[part], f[part]), f[part], fold),
         )
         self._model = self._choose_model(self._near)
+        self._cache.clear()
+        return self
+
+    def update(self, Z: ArrayLike, f: ArrayLike, weight: ArrayLike = 1.0) -> Self:
+        """Takes further rows in; see `UpdatableEstimator`. Length scales and settings stay."""
+        near = self._fitted()
+        Z, f = checked_rows(Z, f)
+        checked_queries(Z, near.Z.shape[1])
+        count = len(near.f) + len(f)
+        order = make_generator("training", "order of local rows").permutation(count)
+        self._near = replace(
+            near,
+            Z=np.vstack([near.Z, Z])[order],
+            f=np.concatenate([near.f, f])[order],
+            environment=np.concatenate([near.environment, np.full(len(f), -1)])[order],
+            weight=np.concatenate([near.weight, checked_weights(weight, len(f))])[order],
+        )
         self._cache.clear()
         return self
 
@@ -178,7 +206,7 @@ class LocalEstimator:
             if len(self._cache) >= _CACHE_SIZE:
                 del self._cache[next(iter(self._cache))]
             rows = near.nearest(cell, self.size)
-            self._cache[key] = model.conditioned_on(near.Z[rows], near.f[rows])
+            self._cache[key] = model.conditioned_on(near.Z[rows], near.f[rows], near.weight[rows])
         return self._cache[key]
 
     def _fitted(self) -> Neighbourhoods:

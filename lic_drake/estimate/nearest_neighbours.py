@@ -7,13 +7,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from lic_drake.estimate.averaging import average_rows
+from lic_drake.estimate.averaging import AveragedRows, average_rows
 from lic_drake.estimate.bandwidth import gaussian_weights, query_neighbours, select_bandwidths
 from lic_drake.estimate.checks import (
     EstimateError,
     Vector,
     checked_queries,
     checked_rows,
+    checked_weights,
 )
 from lic_drake.estimate.estimator import Prediction
 from lic_drake.estimate.folds import selection_folds
@@ -21,9 +22,10 @@ from lic_drake.estimate.folds import selection_folds
 
 @dataclass(frozen=True, kw_only=True)
 class _Points:
-    """Distinct feature vectors, divided by the bandwidths, with their success rates and counts."""
+    """Distinct feature vectors, also divided by the bandwidths, with success rates and counts."""
 
     tree: cKDTree
+    Z: Vector
     points: Vector
     rate: Vector
     count: Vector
@@ -85,16 +87,32 @@ class NearestNeighbours:
         if self._given is None:
             fold = selection_folds(environment, len(f))
             self._chosen = select_bandwidths(rows, f, fold)
-        points = rows.Z / self.bandwidth
-        self._points = _Points(
-            tree=cKDTree(points), points=points, rate=rows.rate, count=rows.count
-        )
+        self._points = _index(rows, self.bandwidth)
         return self
 
-    def conditioned_on(self, Z: ArrayLike, f: ArrayLike) -> "NearestNeighbours":
+    def update(self, Z: ArrayLike, f: ArrayLike, weight: ArrayLike = 1.0) -> Self:
+        """Takes further rows in; see `UpdatableEstimator`.
+
+        A row of weight w counts as w reaches: its kernel weight is multiplied by w. Bandwidths
+        stay.
+        """
+        at = self._fitted()
+        Z, f = checked_rows(Z, f)
+        checked_queries(Z, at.points.shape[1])
+        counts = np.concatenate([at.count, checked_weights(weight, len(f))])
+        rates = np.concatenate([at.rate, f])
+        self._points = _index(average_rows(np.vstack([at.Z, Z]), rates, counts), self.bandwidth)
+        return self
+
+    def conditioned_on(
+        self, Z: ArrayLike, f: ArrayLike, weight: ArrayLike = 1.0
+    ) -> "NearestNeighbours":
         """Returns neighbours with these bandwidths among other rows only."""
         other = NearestNeighbours(neighbours=self.neighbours, bandwidth=self.bandwidth)
-        return other.fit(Z, f)
+        Z, f = checked_rows(Z, f)
+        rows = average_rows(Z, f, checked_weights(weight, len(f)))
+        other._points = _index(rows, self.bandwidth)
+        return other
 
     def predict(self, Z: ArrayLike) -> Prediction:
         """Estimates P(success) for queries Z, shape (n, d); see `Predictor`."""
@@ -136,3 +154,8 @@ class NearestNeighbours:
         if self._points is None:
             raise EstimateError("the nearest neighbours have no rows yet; call fit(Z, f) first")
         return self._points
+
+
+def _index(rows: AveragedRows, bandwidth: Vector) -> _Points:
+    points = rows.Z / bandwidth
+    return _Points(tree=cKDTree(points), Z=rows.Z, points=points, rate=rows.rate, count=rows.count)

@@ -17,6 +17,7 @@ class Posterior:
 
     Attributes:
         Z: Features, shape (m, d).
+        rate: Success rates y, shape (m,).
         hyperparameters: Of the prior and the noise.
         lower: Cholesky factor of C, shape (m, m).
         prior_mean: Generalised-least-squares mean mu.
@@ -25,6 +26,7 @@ class Posterior:
     """
 
     Z: Vector
+    rate: Vector
     hyperparameters: Hyperparameters
     lower: Vector
     prior_mean: float
@@ -50,6 +52,27 @@ class Posterior:
         weight = self.hyperparameters.signal_variance * self.alpha
         return float(self.prior_mean + weight @ correlation), weight @ slope
 
+    def extended(self, rows: AveragedRows) -> "Posterior":
+        """Returns the process given further rows, shape (k, d), too, in m^2 k steps.
+
+        They stand beside the rows that are there, also beside equal ones. With the factor L of C
+        the factor of the larger covariance [[C, B], [B^T, D]] is [[L, 0], [V^T, M]], where
+        V = L^-1 B and M M^T = D - V^T V: the result is that of conditioning on all rows at once.
+        """
+        across = self._covariance(rows.Z)
+        explained = solve_triangular(self.lower, across, lower=True, check_finite=False)
+        own = _noisy_covariance(rows, self.hyperparameters) - explained.T @ explained
+        corner, _ = cho_factor(own, lower=True, overwrite_a=True, check_finite=False)
+        m = len(self.Z)
+        lower = np.zeros((m + len(rows.Z), m + len(rows.Z)), order="F")
+        lower[:m, :m], lower[m:, :m], lower[m:, m:] = self.lower, explained.T, corner
+        return _from_factor(
+            np.vstack([self.Z, rows.Z]),
+            np.concatenate([self.rate, rows.rate]),
+            self.hyperparameters,
+            lower,
+        )
+
     def _covariance(self, Z: Vector) -> Vector:
         """Returns the prior covariance of the rows with queries, shape (m, n)."""
         correlation = l1_correlation(self.Z, Z, self.hyperparameters.theta)
@@ -58,16 +81,30 @@ class Posterior:
 
 def condition(rows: AveragedRows, hyperparameters: Hyperparameters) -> Posterior:
     """Returns the process given rows of success rates."""
-    covariance = hyperparameters.signal_variance * l1_correlation(
-        rows.Z, rows.Z, hyperparameters.theta
+    lower, _ = cho_factor(
+        _noisy_covariance(rows, hyperparameters), lower=True, overwrite_a=True, check_finite=False
     )
+    return _from_factor(rows.Z, rows.rate, hyperparameters, lower)
+
+
+def _noisy_covariance(rows: AveragedRows, hyperparameters: Hyperparameters) -> Vector:
+    """Returns the prior covariance of rows with each other, noise included, shape (m, m)."""
+    correlation = l1_correlation(rows.Z, rows.Z, hyperparameters.theta)
+    covariance: Vector = hyperparameters.signal_variance * correlation
     covariance[np.diag_indices(len(rows.Z))] += hyperparameters.noise(rows.count)
-    lower, _ = cho_factor(covariance, lower=True, overwrite_a=True, check_finite=False)
-    targets = np.column_stack([rows.rate, np.ones(len(rows.rate))])
+    return covariance
+
+
+def _from_factor(
+    Z: Vector, rate: Vector, hyperparameters: Hyperparameters, lower: Vector
+) -> Posterior:
+    """Returns the process given rows whose covariance has this Cholesky factor."""
+    targets = np.column_stack([rate, np.ones(len(rate))])
     weights = cho_solve((lower, True), targets, check_finite=False)
     prior_mean = float(weights[:, 0].sum() / weights[:, 1].sum())
     return Posterior(
-        Z=rows.Z,
+        Z=Z,
+        rate=rate,
         hyperparameters=hyperparameters,
         lower=lower,
         prior_mean=prior_mean,

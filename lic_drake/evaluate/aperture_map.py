@@ -8,12 +8,12 @@ from matplotlib.patches import Circle, Rectangle
 from numpy.typing import NDArray
 
 from lic_drake.reach.pointing_starts import PointingStarts
-from lic_drake.select.objective import Objective
+from lic_drake.select.objective import SuccessObjective
 
 Vector = NDArray[np.float64]
 
 
-def estimate_apertures(objective: Objective, starts: PointingStarts) -> Vector:
+def estimate_apertures(objective: SuccessObjective, starts: PointingStarts) -> Vector:
     """Returns the highest estimate over base and torso at each open aperture, shape (k,).
 
     It is combined with the chance that the aperture is open, where that is not certain. NaN where

@@ -16,6 +16,7 @@ from lic_drake.evaluate.looking_pictures import LookingPictures
 from lic_drake.evaluate.pictures import AperturePictures, Pictures, PlanarPictures
 from lic_drake.evaluate.stills import save_stills
 from lic_drake.evaluate.trial import Attempt, run_trial
+from lic_drake.experience.added import added_columns
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.perception.config import CamerasConfig
 from lic_drake.reach.pointing_starts import PointingStarts
@@ -86,14 +87,17 @@ def demonstrate(
     starts = make_starts(scenario, instance)
     draws = (scenario.sample_goal("evaluation", seed, index) for index in itertools.count())
     p_WG = next(goal for goal in draws if _can_be_reached(scenario, starts, goal))
-    columns = library.columns()
+    columns, added = library.columns(), added_columns(library)
     say(
         f"{scenario.category}, evaluation environment {seed}: goal at"
         f" {_metres(p_WG[:2] if arm.surface is None else p_WG)} m; learning from"
         f" {library.num_reaches} reaches of {library.scenario().category}"
     )
     selector = _Talking(
-        make_selector(method, arm, columns, np.random.default_rng(seed), scenario.category), say
+        make_selector(
+            method, arm, columns, np.random.default_rng(seed), scenario.category, added=added
+        ),
+        say,
     )
     watch = None
     if cameras is not None:
@@ -144,7 +148,7 @@ def demonstrate(
     )
     chosen = selector.selector
     if not isinstance(chosen, LicSelector):  # Shows what LIC would have thought of the choices.
-        chosen = make_selector("gp", arm, columns, category=scenario.category)
+        chosen = make_selector("gp", arm, columns, category=scenario.category, added=added)
     assert isinstance(chosen, LicSelector)
     files = {**pictures.save(out, chosen, done), "data": out / "demo.json"}
     files |= save_stills(scenario, instance, p_WG, done, traces, out, say, meshes)

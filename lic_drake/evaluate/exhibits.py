@@ -14,6 +14,7 @@ from lic_drake.errors import LicError
 from lic_drake.evaluate.embed import read_page
 from lic_drake.evaluate.plots import draw_top_view
 from lic_drake.evaluate.trial import Attempt, run_trial
+from lic_drake.experience.added import added_columns
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.recording import ReachRecording
 from lic_drake.reach.request import is_within_reach
@@ -83,7 +84,9 @@ def choose_exhibits(
     scenario = library.scenario()
     arm = scenario.arm()
     rng = np.random.default_rng(first_environment)
-    selector = make_selector(method, arm, library.columns(), rng, scenario.category)
+    selector = make_selector(
+        method, arm, library.columns(), rng, scenario.category, added=added_columns(library)
+    )
     wanted = {True: each, False: each}
     found = []
     for environment, p_WG in itertools.islice(

@@ -14,6 +14,7 @@ from lic_drake.errors import LibraryError, LicError
 from lic_drake.evaluate.looking import Watch
 from lic_drake.evaluate.trial import Attempt, run_trial
 from lic_drake.evaluate.trials import TrialRow, read_trials, write_trials
+from lic_drake.experience.added import added_columns
 from lic_drake.experience.real_pairs import pair_real_attempts
 from lic_drake.experience.schema import scenario_text
 from lic_drake.experience.store import ExperienceLibrary
@@ -202,7 +203,7 @@ class _Worker:
         self._evaluation = evaluation
         experience = ExperienceLibrary(evaluation.experience)
         self.scenario = evaluation.scenario()
-        self._columns = experience.columns()
+        self._columns, self._added = experience.columns(), added_columns(experience)
         self._pairs = None
         if evaluation.second_attempts is not None:
             attempts = ExperienceLibrary(evaluation.second_attempts)
@@ -270,6 +271,7 @@ class _Worker:
                 self._columns if needs_library(method) else None,
                 category=self.scenario.category,
                 pairs=self._pairs,
+                added=self._added,
             )
         return self._selectors[method]
 

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from lic_drake.evaluate.batch import simulate_requests
+from lic_drake.experience.added import added_columns
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.request import ReachRequest, make_request
 from lic_drake.reach.starts import make_starts
@@ -38,7 +39,11 @@ def collect_second_attempts(
     """
     scenario = experience.scenario()
     selector = make_selector(
-        method, scenario.arm(), experience.columns(), category=scenario.category
+        method,
+        scenario.arm(),
+        experience.columns(),
+        category=scenario.category,
+        added=added_columns(experience),
     )
     firsts: list[ReachRequest] = []
     for environment in environments:

@@ -4,6 +4,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 from lic_drake.errors import LibraryError
+from lic_drake.experience.added import FOLDER, addition_paths, read_addition
 from lic_drake.experience.grid import CollectionRequest
 from lic_drake.experience.journal import journal_paths, read_journal
 from lic_drake.experience.schema import read_header, read_table
@@ -31,7 +32,8 @@ class LibraryReport:
         shards: Number of Parquet files.
         reaches: Number of rows in the readable ones.
         journalled: Number of finished reaches of interrupted tasks, not yet in a shard.
-        damaged: Parquet files that cannot be read.
+        added: Number of readable records that were added from elsewhere.
+        damaged: Parquet files that cannot be read, those of added records included.
         lost_lines: Number of damaged lines in journals; their reaches will be simulated again.
         scenarios: Digests of the scenarios in the library; more than one is an error.
         duplicates: Keys of reaches that the library holds more than once, sorted.
@@ -43,6 +45,7 @@ class LibraryReport:
     shards: int
     reaches: int
     journalled: int
+    added: int
     damaged: tuple[DamagedFile, ...]
     lost_lines: int
     scenarios: tuple[str, ...]
@@ -84,6 +87,12 @@ def check_library(
             scenarios.add(read_header(path).scenario_digest)
         except LibraryError as error:
             damaged.append(DamagedFile(name=path.name, reason=str(error)))
+    added = 0
+    for path in addition_paths(library):
+        try:
+            added += read_addition(path).records
+        except LibraryError as error:
+            damaged.append(DamagedFile(name=f"{FOLDER}/{path.name}", reason=str(error)))
     journals = [read_journal(path) for path in journal_paths(library.path)]
     journalled = {record.key for records, _ in journals for record in records} - keys.keys()
     lacking: dict[int, int] = {}
@@ -98,6 +107,7 @@ def check_library(
         shards=len(paths),
         reaches=keys.total(),
         journalled=len(journalled),
+        added=added,
         damaged=tuple(damaged),
         lost_lines=sum(count for _, count in journals),
         scenarios=tuple(sorted(scenarios)),

@@ -3,6 +3,7 @@
 from collections import Counter
 from dataclasses import dataclass
 
+from lic_drake.experience.added import Addition, additions
 from lic_drake.experience.journal import unfinished_reaches
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.intervals import wilson_interval
@@ -30,6 +31,7 @@ class LibrarySummary:
         wall_time_s: Wall time of all reaches, seconds.
         lic_drake_versions: Versions that simulated the reaches, sorted.
         drake_versions: Versions of Drake that simulated the reaches, sorted.
+        added: Records of real or other simulated robots, which no other number here counts.
     """
 
     category: str
@@ -49,6 +51,7 @@ class LibrarySummary:
     wall_time_s: float
     lic_drake_versions: tuple[str, ...]
     drake_versions: tuple[str, ...]
+    added: tuple[Addition, ...]
 
     @property
     def success_rate(self) -> float:
@@ -85,4 +88,5 @@ def summarize(library: ExperienceLibrary) -> LibrarySummary:
         wall_time_s=float(columns["wall_time_s"].sum()),
         lic_drake_versions=tuple(sorted(set(columns["lic_drake_version"]))),
         drake_versions=tuple(sorted(set(columns["drake_version"]))),
+        added=additions(library),
     )

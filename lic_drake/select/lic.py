@@ -11,7 +11,7 @@ from lic_drake.errors import RequestError
 from lic_drake.estimate.checks import EstimateError
 from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.select.baselines import make_selection
-from lic_drake.select.objective import Objective, SuccessModel
+from lic_drake.select.objective import Objective, SuccessModel, SuccessObjective
 from lic_drake.select.situation import FailedReach, Selection, Situation
 
 Vector = NDArray[np.float64]
@@ -65,7 +65,7 @@ class LicSelector(ABC):
         probability = float(np.clip(best_value, 0.0, 1.0))
         return make_selection(situation, best, 0, probability, self.method, began)
 
-    def objective(self, situation: Situation) -> Objective:
+    def objective(self, situation: Situation) -> SuccessObjective:
         """Returns what is maximised in a situation."""
         seen = self._observable(situation.failed)
         if self.second is not None and seen:
@@ -84,7 +84,7 @@ class LicSelector(ABC):
     def _improve(
         self,
         situation: Situation,
-        objective: Objective,
+        objective: SuccessObjective,
         candidates: InitialConditions,
         values: Vector,
     ) -> Iterable[InitialConditions]:

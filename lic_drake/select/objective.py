@@ -1,6 +1,7 @@
 """F(T_b0(s), x0) of paper Eq. (3) as a function of the initial condition, for one situation."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,28 @@ class SuccessModel:
 
     estimator: SuccessEstimator
     features: FeatureMap
+
+
+class SuccessObjective(Protocol):
+    """What the optimisation maximises over initial conditions, in one situation."""
+
+    @property
+    def failed(self) -> tuple[FailedReach, ...]:
+        """Failures that are observed; without any, starts near failed ones are ruled out."""
+        ...
+
+    def values(self, conditions: InitialConditions) -> Vector:
+        """Returns the unclipped estimates at n initial conditions, shape (n,)."""
+        ...
+
+    def value_and_gradient(self, x0: Vector, b0: Vector) -> tuple[float, Vector, Vector]:
+        """Returns the estimate and its gradients by x0 and by b0, shape (3,).
+
+        Args:
+            x0: Hand pose in W, shape (3,), or (7,) in space.
+            b0: Place of the base and height of the torso, shape (3,), metres.
+        """
+        ...
 
 
 @dataclass(frozen=True, kw_only=True)

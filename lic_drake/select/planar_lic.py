@@ -10,7 +10,7 @@ from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.reach.starts import Region, find_region, is_possible
 from lic_drake.robots.planar import PlanarArm
 from lic_drake.select.lic import LicSelector
-from lic_drake.select.objective import Objective, SuccessModel
+from lic_drake.select.objective import SuccessModel, SuccessObjective
 from lic_drake.select.planar_program import PlanarProgram
 from lic_drake.select.situation import Situation
 
@@ -41,7 +41,7 @@ class PlanarLic(LicSelector):
     def _improve(
         self,
         situation: Situation,
-        objective: Objective,
+        objective: SuccessObjective,
         candidates: InitialConditions,
         values: Vector,
     ) -> Iterator[InitialConditions]:
@@ -57,7 +57,7 @@ class PlanarLic(LicSelector):
     def _solve(
         self,
         situation: Situation,
-        objective: Objective,
+        objective: SuccessObjective,
         regions: tuple[Region, ...],
         x0: Vector,
         p_WR: Vector,
@@ -86,7 +86,7 @@ class PlanarLbfgsb(PlanarLic):
     def _solve(
         self,
         situation: Situation,
-        objective: Objective,
+        objective: SuccessObjective,
         regions: tuple[Region, ...],
         x0: Vector,
         p_WR: Vector,

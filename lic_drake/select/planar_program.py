@@ -7,7 +7,7 @@ from pydrake.solvers import MathematicalProgram, NloptSolver, SolverOptions
 
 from lic_drake.reach.starts import Region
 from lic_drake.robots.planar_kinematics import PlanarArmKinematics
-from lic_drake.select.objective import Objective
+from lic_drake.select.objective import SuccessObjective
 
 Vector = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ class PlanarProgram:
 
     def __init__(self, kinematics: PlanarArmKinematics) -> None:
         self._kinematics = kinematics
-        self._objective: Objective | None = None
+        self._objective: SuccessObjective | None = None
         self.program = MathematicalProgram()
         self.x0 = self.program.NewContinuousVariables(3, "x0")
         self.b0 = self.program.NewContinuousVariables(2, "b0")
@@ -48,7 +48,7 @@ class PlanarProgram:
         self._solver = NloptSolver()
 
     def solve(
-        self, objective: Objective, region: Region, x0: Vector, p_WR: Vector, q: Vector
+        self, objective: SuccessObjective, region: Region, x0: Vector, p_WR: Vector, q: Vector
     ) -> tuple[Vector, Vector]:
         """Returns x0, shape (3,), and b0, shape (2,), where the solver ends, feasible or not.
 

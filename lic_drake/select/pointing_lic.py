@@ -10,7 +10,7 @@ from lic_drake.errors import RequestError
 from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.reach.pointing_starts import PointingStarts
 from lic_drake.select.lic import LicSelector
-from lic_drake.select.objective import Objective
+from lic_drake.select.objective import SuccessObjective
 from lic_drake.select.pointing_program import PointingProgram
 from lic_drake.select.situation import Situation
 
@@ -32,7 +32,7 @@ class PointingLic(LicSelector):
     def _improve(
         self,
         situation: Situation,
-        objective: Objective,
+        objective: SuccessObjective,
         candidates: InitialConditions,
         values: Vector,
     ) -> Iterator[InitialConditions]:
@@ -49,7 +49,7 @@ class PointingLic(LicSelector):
                 yield InitialConditions(x0[None], b0[None, :2], b0[2:])
 
     def _solve(
-        self, starts: PointingStarts, objective: Objective, x0: Vector, b0: Vector
+        self, starts: PointingStarts, objective: SuccessObjective, x0: Vector, b0: Vector
     ) -> tuple[Vector, Vector]:
         """Returns x0 and b0 where the optimisation ends, possible or not."""
         q = starts.angles(x0, b0[:2], b0[2])
@@ -65,7 +65,7 @@ class PointingLbfgsb(PointingLic):
     """The paper's own optimiser: L-BFGS-B over base and torso, the arm pre-selected (III-E)."""
 
     def _solve(
-        self, starts: PointingStarts, objective: Objective, x0: Vector, b0: Vector
+        self, starts: PointingStarts, objective: SuccessObjective, x0: Vector, b0: Vector
     ) -> tuple[Vector, Vector]:
         stand = starts.stand
 

@@ -8,7 +8,7 @@ from pydrake.solvers import MathematicalProgram, SnoptSolver, SolverOptions
 
 from lic_drake.reach.pointing_starts import PointingStarts
 from lic_drake.robots.pr2 import Pr2Arm
-from lic_drake.select.objective import Objective
+from lic_drake.select.objective import SuccessObjective
 
 Vector = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ class PointingProgram:
     def __init__(self, starts: PointingStarts) -> None:
         stand = starts.stand
         self._arm = Pr2Arm()
-        self._objective: Objective | None = None
+        self._objective: SuccessObjective | None = None
         self._p_WA = np.zeros(3)
         self.program = MathematicalProgram()
         self.b0 = self.program.NewContinuousVariables(4, "b0")
@@ -64,7 +64,7 @@ class PointingProgram:
         self._solver = SnoptSolver()
 
     def solve(
-        self, objective: Objective, p_WA: Vector, b0: Vector, q: Vector
+        self, objective: SuccessObjective, p_WA: Vector, b0: Vector, q: Vector
     ) -> tuple[Vector, Vector]:
         """Returns b0, shape (3,), and q, shape (7,), where the solver ends, feasible or not.
 

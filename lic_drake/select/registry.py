@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from lic_drake.errors import RequestError
 from lic_drake.estimate.categories import features_of
+from lic_drake.estimate.checks import EstimateError
+from lic_drake.estimate.estimator import UpdatableEstimator
 from lic_drake.estimate.features import FeatureMap
 from lic_drake.estimate.registry import estimator_names, make_estimator
 from lic_drake.experience.second_reach import pair_reaches
@@ -94,6 +96,7 @@ def make_selector(
     rng: np.random.Generator | None = None,
     category: str = "cylinder-clutter",
     pairs: Mapping[str, NDArray[Any]] | None = None,
+    added: Mapping[str, NDArray[Any]] | None = None,
 ) -> Selector:
     """Returns a strategy, fitted to a library if it learns from one.
 
@@ -105,6 +108,7 @@ def make_selector(
         category: Clutter category, which says what LIC observes.
         pairs: Columns of D2 for LIC-2, see `lic_drake.experience.real_pairs`; by default it is
             made from the single reaches of `columns`, as in the paper.
+        added: Experience from elsewhere, see `lic_drake.experience.added.added_columns`.
 
     Raises:
         RequestError: The strategy is unknown, or has no library to learn from.
@@ -113,8 +117,8 @@ def make_selector(
     first, later = split_method(method)
     if later is not None:
         return FallbackSelector(
-            first=make_selector(first, arm, columns, rng, category, pairs),
-            later=make_selector(later, arm, columns, rng, category, pairs),
+            first=make_selector(first, arm, columns, rng, category, pairs, added),
+            later=make_selector(later, arm, columns, rng, category, pairs, added),
             method=method,
         )
     if not needs_library(method):
@@ -130,8 +134,9 @@ def make_selector(
     second = None
     if not only_first:
         pairs = pair_reaches(columns) if pairs is None else pairs
-        second = fit_model(estimator, features.second, pairs)
-    first_model = fit_model(estimator, features.first, columns)
+        added_pairs = None if added is None else pair_reaches(added)
+        second = fit_model(estimator, features.second, pairs, added_pairs)
+    first_model = fit_model(estimator, features.first, columns, added)
     if isinstance(arm, PlanarArm):
         return PlanarLic(arm, first_model, second, method=method)
     if isinstance(arm, Pr2Arm):
@@ -140,15 +145,30 @@ def make_selector(
 
 
 def fit_model(
-    estimator: str, features: FeatureMap, columns: Mapping[str, NDArray[Any]]
+    estimator: str,
+    features: FeatureMap,
+    columns: Mapping[str, NDArray[Any]],
+    added: Mapping[str, NDArray[Any]] | None = None,
 ) -> SuccessModel:
-    """Returns an estimator fitted to the columns of a library.
+    """Returns an estimator fitted to the columns of a library, then updated with added ones.
 
     Args:
         estimator: Its name, see `estimator_names`.
         features: What z is made of.
         columns: Of a library D1, or the pairs D2 where the features observe a first reach.
+        added: The same of experience from elsewhere, with weights; it changes no setting.
+
+    Raises:
+        EstimateError: The estimator has no `update` and there is something to add.
     """
     rows = features.rows(columns)
     fitted = make_estimator(estimator, features).fit(rows.Z, rows.f, rows.environment)
+    if added is not None and len(added["success"]):
+        if not isinstance(fitted, UpdatableEstimator):
+            raise EstimateError(
+                f"the estimator {estimator!r} has no method `update` and cannot learn from the"
+                " records that were added to the library; give it one, or use another estimator"
+            )
+        more = features.rows(added)
+        fitted.update(more.Z, more.f, more.weight)
     return SuccessModel(estimator=fitted, features=features)

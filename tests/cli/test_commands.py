@@ -38,7 +38,7 @@ def test_the_tree_is_the_one_that_is_meant() -> None:
     assert set(names) >= {
         *("lic demo", "lic reach", "lic select", "lic collect", "lic evaluate", "lic gallery"),
         *("lic bench", "lic experience info", "lic experience check"),
-        *("lic experience recompute", "lic experience merge"),
+        *("lic experience recompute", "lic experience merge", "lic experience add"),
     }
 
 
@@ -95,7 +95,7 @@ def test_what_a_machine_may_read_comes_as_json() -> None:
     with_json = {name for name, parser in LEAVES if "--json" in parser._option_string_actions}
     assert with_json == {
         *("lic reach", "lic select", "lic collect", "lic evaluate", "lic gallery", "lic bench"),
-        *("lic experience info", "lic experience check"),
+        *("lic experience info", "lic experience check", "lic experience add"),
     }
 
 
@@ -119,6 +119,7 @@ WRONG = [
     ("experience info {none}", "make one with: lic collect"),
     ("experience check {none}", "make one with: lic collect"),
     ("experience recompute {none}", "make one with: lic collect"),
+    ("experience add {none} {file} --source lab", ".csv or .parquet"),
     ("experience merge {file}/new.parquet {none}", "no experience library"),
     ("evaluate {none} --methods jungle", "choose one of"),
     ("evaluate {none} --library {none}", "make one with: lic collect"),

@@ -19,9 +19,9 @@ class CountingProcess(GaussianProcess):
         super().__init__(hyperparameters=PRIOR)
         self.given: list[tuple[np.ndarray, np.ndarray]] = []
 
-    def conditioned_on(self, Z, f):
+    def conditioned_on(self, Z, f, weight=1.0):
         self.given.append((Z, f))
-        return super().conditioned_on(Z, f)
+        return super().conditioned_on(Z, f, weight)
 
 
 @pytest.fixture

@@ -12,6 +12,7 @@ def _near(Z, f, environment, length_scale) -> Neighbourhoods:
         Z=Z[order],
         f=f[order],
         environment=environment[order],
+        weight=np.ones(len(f)),
         situation=slice(0, 2),
         length_scale=np.asarray(length_scale),
     )

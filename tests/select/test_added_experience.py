@@ -1,0 +1,70 @@
+"""Strategies of a library to which experience was added."""
+
+import numpy as np
+import pytest
+from fake_reach import fill_library
+from numpy.typing import NDArray
+from select_surfaces import Bumps
+from starts import ARM
+
+from lic_drake.estimate.checks import EstimateError
+from lic_drake.estimate.features import PLANAR_LIC1
+from lic_drake.experience.added import add_records, added_columns
+from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.select import registry
+from lic_drake.select.lic import LicSelector
+from lic_drake.select.registry import fit_model, make_selector
+
+QUERY = np.array([[0.6, 0.1, 0.2, 1.0]])
+END = {f"final_{name}": 0.1 for name in ("x", "y", "phi", "vx", "vy")}
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> ExperienceLibrary:
+    """With thirty failures in as many places and a place with a failure and a success after it."""
+    library = ExperienceLibrary(fill_library(tmp_path_factory.mktemp("library") / "mine"))
+    start = {"goal_x": 0.6, "goal_y": 0.1, "start_y": 0.2, "start_phi": 1.0}
+    rows = [{**start, "success": False} for _ in range(30)]
+    rows += [{**start, **END, "success": won, "environment": 500} for won in (False, True)]
+    add_records(library, rows, source="lab", weight=20.0)
+    return library
+
+
+def second(selector: object) -> NDArray[np.float64]:
+    """LIC-2's estimate after the failure of the added pair."""
+    assert isinstance(selector, LicSelector) and selector.second is not None
+    names = selector.second.features.names
+    known = {"goal_x": 0.6, "goal_y": 0.1, "start_y": 0.2, "start_phi": 1.0}
+    known |= {"first_start_y": 0.2, "first_start_phi": 1.0, "first_final_x": 0.1}
+    return selector.second.estimator.values([[known.get(name, 0.1) for name in names]])
+
+
+@pytest.mark.parametrize("method", ["gp1", "knn1", "knn1>cost"])
+def test_the_first_attempts_estimates_take_what_was_added_in(
+    method: str, library: ExperienceLibrary
+) -> None:
+    columns, added = library.columns(), added_columns(library)
+    chosen = [make_selector(method, ARM, columns, added=extra) for extra in (None, added)]
+    models = [getattr(selector, "first", selector) for selector in chosen]
+    models = [getattr(model, "first", model) for model in models]
+    before, after = (model.estimator.values(QUERY)[0] for model in models)
+    assert after < 0.2 < before - 0.1
+
+
+def test_the_second_attempts_estimates_learn_from_added_pairs(library: ExperienceLibrary) -> None:
+    columns, added = library.columns(), added_columns(library)
+    before = second(make_selector("knn", ARM, columns))
+    after = second(make_selector("knn", ARM, columns, added=added))
+    # The added failure was followed by itself, which fails again, and by the success.
+    assert after[0] == pytest.approx(0.5, abs=0.05)
+    assert before[0] != pytest.approx(0.5, abs=0.05)
+
+
+def test_an_estimator_that_cannot_go_on_learning_says_so(
+    library: ExperienceLibrary, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fixed = Bumps(np.zeros((1, 2)), np.ones(1), np.ones(2))
+    monkeypatch.setattr(registry, "make_estimator", lambda name, features: fixed)
+    assert fit_model("mine", PLANAR_LIC1, library.columns()).estimator is fixed
+    with pytest.raises(EstimateError, match="'mine' has no method `update`"):
+        fit_model("mine", PLANAR_LIC1, library.columns(), added_columns(library))
