@@ -2,7 +2,8 @@
 
 Whether the PR2 comes to a goal depends first of all on how far the goal lies aside of the aperture
 through which it reaches. A kernel with a scale for each feature can say so only if this difference
-is a feature: from goals 0.2 m apart, those held out are then predicted better
+is a feature: from goals 0.2 m apart, those held out are then predicted better, and the process's
+chosen start succeeds in 183 of 480 cases instead of 163
 (notebooks/results/ablation/space_features.md).
 """
 
