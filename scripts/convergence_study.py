@@ -36,10 +36,10 @@ PLANAR = {
 }
 IN_SPACE = {
     "CENIC, up to 20 ms (chosen)": "{}",
-    "CENIC, up to 40 ms": "{scene: {cenic_max_step_s: 0.04}}",
     "CENIC, up to 10 ms": "{scene: {cenic_max_step_s: 0.01}}",
-    "CENIC, accuracy 1e-4": "{scene: {cenic_accuracy: 1.0e-4}}",
+    "CENIC, up to 40 ms": "{scene: {cenic_max_step_s: 0.04}}",
     "meshes half as fine": "{scene: {contact: {skin_mesh_m: 0.06, object_mesh_m: 0.04}}}",
+    "CENIC, accuracy 1e-4": "{scene: {cenic_accuracy: 1.0e-4}}",
     "meshes twice as fine": "{scene: {contact: {skin_mesh_m: 0.015, object_mesh_m: 0.01}}}",
     "discrete, 2 ms": "{scene: {time_step_s: 0.002}}",
 }

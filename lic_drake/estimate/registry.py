@@ -83,7 +83,7 @@ def estimator_names() -> tuple[str, ...]:
 def _process(features: FeatureMap) -> SuccessEstimator:
     """All rows of LIC-1; of LIC-2's many rows the nearest."""
     if can_be_relative(features):
-        return _in_space(features, GaussianProcess)
+        return _in_space(features, GaussianProcess, None)
     if not features.observed:
         return GaussianProcess()
     return LocalEstimator(choose_process, features.situation, size=800)
@@ -91,7 +91,7 @@ def _process(features: FeatureMap) -> SuccessEstimator:
 
 def _neighbours(features: FeatureMap) -> SuccessEstimator:
     if can_be_relative(features):
-        return _in_space(features, NearestNeighbours)
+        return _in_space(features, NearestNeighbours, features.situation)
     if not features.observed:
         return NearestNeighbours()
     return LocalEstimator(
@@ -101,13 +101,21 @@ def _neighbours(features: FeatureMap) -> SuccessEstimator:
     )
 
 
-def _in_space(features: FeatureMap, make: Callable[[], SuccessEstimator]) -> SuccessEstimator:
-    """Returns an estimator that looks at where the goal is from the start."""
+def _in_space(
+    features: FeatureMap, make: Callable[[], SuccessEstimator], held_out: slice | None
+) -> SuccessEstimator:
+    """Returns an estimator that looks at where the goal is from the start.
+
+    Args:
+        features: What z means.
+        make: Returns the estimator that is told, for each stage.
+        held_out: See `MappedEstimator`.
+    """
     if not features.observed:
-        return MappedEstimator(make(), relative_features(features))
+        return MappedEstimator(make(), relative_features(features), held_out)
     alone = replace(features, observed=())
     return StackedEstimator(
-        make_first=lambda: _in_space(alone, make),
+        make_first=lambda: _in_space(alone, make, alone.situation if held_out else None),
         make_second=make,
         alone=np.array([features.names.index(name) for name in alone.names]),
         matrix=features_apart(features, "start", "first_start"),

@@ -65,7 +65,8 @@ def solve_pointing(
 
     Args:
         kinematics: The arm.
-        p_RE: Position of the tool frame, shape (3,), metres.
+        p_RE: Position of the tool frame, shape (3,), or one for each pan angle, shape (k, 3),
+            metres.
         u_R: Unit vector along which the tool points, shape (3,).
         pan: Pan angles to try, shape (k,), radians; by default a row over the joint's range.
 
@@ -143,8 +144,8 @@ def _look_from_shoulder(
     p_AW = p_RE - kinematics.lengths.tool * u_R - kinematics.p_RA
     c, s = np.cos(kinematics.yaw + pan), np.sin(kinematics.yaw + pan)
     p_SW, u_S = (
-        np.column_stack([c * v[0] + s * v[1], c * v[1] - s * v[0], np.full(len(pan), v[2])])
-        for v in (p_AW, u_R)
+        np.column_stack([c * x + s * y, c * y - s * x, z])
+        for x, y, z in (np.broadcast_to(v, (len(pan), 3)).T for v in (p_AW, u_R))
     )
     p_SW[:, 0] -= kinematics.lengths.shoulder
     return _Heading(p_SW, u_S)

@@ -12,6 +12,7 @@ from lic_drake.estimate.linear_map import (
     features_apart,
     relative_features,
 )
+from lic_drake.estimate.nearest_neighbours import NearestNeighbours
 from lic_drake.estimate.registry import make_estimator
 
 FEATURES = features_of("sphere-aperture-clutter")
@@ -62,3 +63,20 @@ def test_equal_differences_are_one_feature() -> None:
     rows = np.array([[0.1, 0.0, 0.3, 0.0, 0.0], [0.2, 0.0, 0.4, 0.0, 0.0]])
     mapped = MappedEstimator(GaussianProcess(), relative_features(FEATURES.first))._map(rows)
     np.testing.assert_array_equal(mapped[0, :2], mapped[1, :2])
+
+
+def test_neighbours_reach_beyond_the_pairs_that_every_environment_repeats() -> None:
+    """With environments held out the other copies of a pair would tell all there is to know."""
+    rng = np.random.default_rng(8)
+    rows = rng.uniform(-0.5, 0.5, (300, 5))
+    rows[:, :2] = np.round(rows[:, :2], 1)
+    won = (np.abs(rows[:, 2] - rows[:, 0]) < 0.2).astype(float)
+    Z_all, f_all = np.tile(rows, (6, 1)), np.tile(won, 6)
+    environment = np.repeat(np.arange(6), len(rows))
+    matrix = relative_features(FEATURES.first)
+    by_environment = MappedEstimator(NearestNeighbours(), matrix).fit(Z_all, f_all, environment)
+    by_situation = make_estimator("knn", FEATURES.first).fit(Z_all, f_all, environment)
+    new = rng.uniform(-0.5, 0.5, (2000, 5))
+    truth = np.abs(new[:, 2] - new[:, 0]) < 0.2
+    loss = [np.mean((e.values(new) - truth) ** 2) for e in (by_environment, by_situation)]
+    assert loss[1] < 0.9 * loss[0]
