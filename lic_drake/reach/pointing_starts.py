@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,6 +114,18 @@ class PointingStarts:
         q = self.scenario.arm(torso_m).start_angles(x0_R)
         return _first_free(self.checker, q, p_WR, torso_m)
 
+    def pre_select(self, p_WA: Vector, b0: Vector) -> tuple[Vector, Vector] | None:
+        """Returns the initial condition at an aperture that Eq. (5) prefers, None if there is none.
+
+        Args:
+            p_WA: Centre of an open aperture, shape (3,), metres.
+            b0: Place of the base and height of the torso, shape (3,), metres.
+
+        Returns:
+            Tool pose in W, shape (7,), and joint angles, shape (7,), radians.
+        """
+        return _pre_select(self.checker, p_WA, b0)
+
     @cached_property
     def _table(self) -> tuple[InitialConditions, Vector]:
         bare, stand = self._bare_board, self.stand
@@ -208,27 +221,34 @@ def _preselect(
         Pr2Arm(mobile=True), _board(np.array(boxes).reshape(-1, 6)), SceneConfig()
     )
     x0, p_WR, torso, angles = [], [], [], []
-    for y_m in places:
-        for torso_m in heights:
-            arm = pr2_arm().raised(torso_m)
-            base = np.array([0.0, y_m])
-            for p_WE in np.array(p_WA):
-                q = solve_pointing(arm.kinematics, p_WE - [*base, 0.0], ROBOT_TO_CLUTTER)
-                q = q[np.argsort(calc_preselection_cost(arm.kinematics, q), kind="stable")]
-                free = _first_free(checker, q, base, torso_m)
-                if free is not None:
-                    pose = arm.tip_pose(free)
-                    # Exactly the centre, and no negative zeros: they would make another key of
-                    # the same start.
-                    pose[:3] = p_WE
-                    x0.append(pose + 0.0)
-                    p_WR.append(base)
-                    torso.append(torso_m)
-                    angles.append(free)
+    for y_m, torso_m, p_WE in product(places, heights, np.array(p_WA)):
+        found = _pre_select(checker, p_WE, np.array([0.0, y_m, torso_m]))
+        if found is not None:
+            x0.append(found[0])
+            p_WR.append(np.array([0.0, y_m]))
+            torso.append(torso_m)
+            angles.append(found[1])
     conditions = InitialConditions(
         np.array(x0).reshape(-1, 7), np.array(p_WR).reshape(-1, 2), np.array(torso)
     )
     return conditions, np.array(angles).reshape(-1, 7)
+
+
+def _pre_select(
+    checker: CollisionChecker, p_WA: Vector, b0: Vector
+) -> tuple[Vector, Vector] | None:
+    """Returns tool pose and joint angles that Eq. (5) prefers; see `PointingStarts.pre_select`."""
+    torso_m = float(b0[2])
+    arm = pr2_arm().raised(torso_m)
+    q = solve_pointing(arm.kinematics, p_WA - [b0[0], b0[1], 0.0], ROBOT_TO_CLUTTER)
+    q = q[np.argsort(calc_preselection_cost(arm.kinematics, q), kind="stable")]
+    free = _first_free(checker, q, b0[:2], torso_m)
+    if free is None:
+        return None
+    pose = arm.tip_pose(free)
+    # Exactly the centre, and no negative zeros: they would make another key of the same start.
+    pose[:3] = p_WA
+    return pose + 0.0, free
 
 
 def _first_free(
