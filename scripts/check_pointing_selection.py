@@ -118,9 +118,12 @@ def check_situation(
             situation = Situation(p_WG=p_WG, starts=starts, failed=failed)
             objective = PointingLic(first, second).objective(situation)
             began = time.perf_counter()
-            of_grid = float(objective.values(grid).max(initial=-np.inf))
+            allowed = grid.take(situation.allowed(grid))
+            of_grid = float(objective.values(allowed).max(initial=-np.inf))
             candidates_s = time.perf_counter() - began
-            best = best_possible(starts, sampled, objective.values(sampled))
+            # A further attempt goes through another aperture.
+            others = sampled.take(situation.allowed(sampled))
+            best = best_possible(starts, others, objective.values(others))
             next_failed = failed
             for kind, optimiser in OPTIMISERS.items():
                 began, value = time.perf_counter(), -np.inf

@@ -1,6 +1,7 @@
 """LIC's optimisation for a PR2 before a board of apertures."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +10,7 @@ from scipy.optimize import minimize
 from lic_drake.errors import RequestError
 from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.reach.pointing_starts import PointingStarts
+from lic_drake.reach.task import Stand
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.objective import SuccessObjective
 from lic_drake.select.pointing_program import PointingProgram
@@ -16,13 +18,15 @@ from lic_drake.select.situation import Situation
 
 Vector = NDArray[np.float64]
 
-LATTICE_M = 0.03
+LATTICE_M = 0.02
 """Distance of neighbouring places of the base and heights of the torso that are compared before
-solving: a third of the grid's. From the grid's best places alone the solver's end was below the
-best of 20,000 samples in two of five situations, by up to 5 points; the kinks of an L1 kernel are
-where it stops."""
+solving. From the grid's best places alone the solver's end was below the best of 20,000 samples in
+two of five situations, by up to 5 points: an L1 kernel has kinks, where it stops."""
 
-MAX_TRIED = 12
+FINE_M = 0.003
+"""The same around the best place, up to the neighbours in the coarser lattice."""
+
+MAX_TRIED = 40
 """So many places at an aperture are tried, the best first, until the arm can be there."""
 
 MAX_GAIN = 0.02
@@ -52,34 +56,39 @@ class PointingLic(LicSelector):
         values: Vector,
     ) -> Iterator[InitialConditions]:
         starts = _pointing(situation)
-        lattice = _lattice(starts)
+        lattice = _lattice(starts.stand, LATTICE_M)
         places = []
         for p_WA in starts.p_WA:
             here = np.all(np.isclose(candidates.x0[:, :3], p_WA), axis=1)
-            if not np.any(here):
-                continue
-            x0 = candidates.x0[np.flatnonzero(here)[np.argmax(values[here])]]
-            at = InitialConditions(
-                np.tile(x0, (len(lattice), 1)), lattice[:, :2].copy(), lattice[:, 2].copy()
-            )
-            found = objective.values(at) * self._chance(situation, at)
-            places.append((p_WA, found, np.argsort(-found, kind="stable")[:MAX_TRIED]))
+            if np.any(here):
+                x0 = candidates.x0[np.flatnonzero(here)[np.argmax(values[here])]]
+                places.append((x0, self._values(situation, objective, x0, lattice)))
         places.sort(key=lambda place: -place[1].max())
         best = float(values.max())
-        for p_WA, found, order in places:
+        for x0, found in places:
             if found.max() < best - MAX_GAIN:
                 break
-            for i in order:
-                start = starts.pre_select(p_WA, lattice[i])
-                if start is None:
-                    continue
-                x0, b0 = start[0], _inside(starts, lattice[i])
-                yield InitialConditions(x0[None], b0[None, :2], b0[2:])
-                best = max(best, float(found[i]))
-                x0, b0 = self._solve(starts, objective, x0, b0)
-                if starts.angles(x0, b0[:2], b0[2]) is not None:
-                    yield InitialConditions(x0[None], b0[None, :2], b0[2:])
-                break
+            start = _first_possible(starts, x0[:3], lattice, found)
+            if start is None:
+                continue
+            fine = _lattice(_around(starts.stand, start[1]), FINE_M)
+            nearby = self._values(situation, objective, x0, fine)
+            start = _first_possible(starts, x0[:3], fine, nearby) or start
+            for pose, b0 in (start, self._solve(starts, objective, *start)):
+                if starts.angles(pose, b0[:2], b0[2]) is not None:
+                    condition = InitialConditions(pose[None], b0[None, :2], b0[2:])
+                    yield condition
+                    best = max(best, float(objective.values(condition)[0]))
+
+    def _values(
+        self, situation: Situation, objective: SuccessObjective, x0: Vector, places: Vector
+    ) -> Vector:
+        """Returns the estimates of a tool pose from places, shape (n, 3): shape (n,)."""
+        at = InitialConditions(
+            np.tile(x0, (len(places), 1)), places[:, :2].copy(), places[:, 2].copy()
+        )
+        values: Vector = objective.values(at) * self._chance(situation, at)
+        return values
 
     def _solve(
         self, starts: PointingStarts, objective: SuccessObjective, x0: Vector, b0: Vector
@@ -131,16 +140,41 @@ def _pose(p_WA: Vector, half_roll: float) -> Vector:
     return np.concatenate([p_WA, wxyz if wxyz[0] >= 0.0 else -wxyz]) + 0.0
 
 
-def _lattice(starts: PointingStarts) -> Vector:
+def _lattice(stand: Stand, step_m: float) -> Vector:
     """Returns places of the base and heights of the torso, shape (n, 3), metres."""
-    stand = starts.stand
-    y = _steps(stand.y_min_m, stand.y_max_m)
-    torso = _steps(stand.torso_min_m, stand.torso_max_m)
+    y = _steps(stand.y_min_m, stand.y_max_m, step_m)
+    torso = _steps(stand.torso_min_m, stand.torso_max_m, step_m)
     return np.array([[0.0, y_m, torso_m] for y_m in y for torso_m in torso])
 
 
-def _steps(low: float, high: float) -> Vector:
-    return np.linspace(low, high, int(np.ceil((high - low) / LATTICE_M - 1e-9)) + 1)
+def _steps(low: float, high: float, step: float) -> Vector:
+    return np.linspace(low, high, int(np.ceil((high - low) / step - 1e-9)) + 1)
+
+
+def _around(stand: Stand, b0: Vector) -> Stand:
+    """Returns the part of where base and torso may be that is around a place."""
+    _, y_m, torso_m = b0
+    return replace(
+        stand,
+        y_min_m=max(stand.y_min_m, y_m - LATTICE_M),
+        y_max_m=min(stand.y_max_m, y_m + LATTICE_M),
+        torso_min_m=max(stand.torso_min_m, torso_m - LATTICE_M),
+        torso_max_m=min(stand.torso_max_m, torso_m + LATTICE_M),
+        training_y_m=[y_m],
+        training_torso_m=[torso_m],
+    )
+
+
+def _first_possible(
+    starts: PointingStarts, p_WA: Vector, places: Vector, values: Vector
+) -> tuple[Vector, Vector] | None:
+    """Returns tool pose and place, shape (7,) and (3,), of the best place where the arm can be."""
+    for i in np.argsort(-values, kind="stable")[:MAX_TRIED]:
+        b0 = _inside(starts, places[i])
+        found = starts.pre_select(p_WA, b0)
+        if found is not None:
+            return found[0], b0
+    return None
 
 
 def _inside(starts: PointingStarts, b0: Vector) -> Vector:
