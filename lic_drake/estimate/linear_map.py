@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lic_drake.estimate.checks import Vector, checked_queries, checked_rows
-from lic_drake.estimate.estimator import Prediction, SuccessEstimator
+from lic_drake.estimate.estimator import Prediction, UpdatableEstimator
 from lic_drake.estimate.features import FeatureMap
 
 _DECIMALS = 9
@@ -21,7 +21,7 @@ _DECIMALS = 9
 
 
 class MappedEstimator:
-    """Hands M z to another estimator; satisfies `SuccessEstimator`.
+    """Hands M z to another estimator; satisfies `UpdatableEstimator`.
 
     Attributes:
         inner: The other estimator.
@@ -33,7 +33,7 @@ class MappedEstimator:
     """
 
     def __init__(
-        self, inner: SuccessEstimator, matrix: Vector, held_out: slice | None = None
+        self, inner: UpdatableEstimator, matrix: Vector, held_out: slice | None = None
     ) -> None:
         self.inner = inner
         self.matrix = matrix
@@ -46,6 +46,12 @@ class MappedEstimator:
             values = np.round(Z[:, self.held_out], _DECIMALS)
             environment = np.unique(values, axis=0, return_inverse=True)[1].ravel()
         self.inner.fit(self._map(Z), f, environment)
+        return self
+
+    def update(self, Z: ArrayLike, f: ArrayLike, weight: ArrayLike = 1.0) -> Self:
+        """Takes further rows in; see `UpdatableEstimator`."""
+        Z, f = checked_rows(Z, f)
+        self.inner.update(self._map(Z), f, weight)
         return self
 
     def predict(self, Z: ArrayLike) -> Prediction:

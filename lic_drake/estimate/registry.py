@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from lic_drake.estimate.checks import EstimateError
-from lic_drake.estimate.estimator import SuccessEstimator
+from lic_drake.estimate.estimator import SuccessEstimator, UpdatableEstimator
 from lic_drake.estimate.features import PLANAR_LIC1, FeatureMap
 from lic_drake.estimate.gaussian_process import GaussianProcess
 from lic_drake.estimate.linear_map import (
@@ -102,8 +102,8 @@ def _neighbours(features: FeatureMap) -> SuccessEstimator:
 
 
 def _in_space(
-    features: FeatureMap, make: Callable[[], SuccessEstimator], held_out: slice | None
-) -> SuccessEstimator:
+    features: FeatureMap, make: Callable[[], UpdatableEstimator], held_out: slice | None
+) -> UpdatableEstimator:
     """Returns an estimator that looks at where the goal is from the start.
 
     Args:

@@ -14,8 +14,14 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lic_drake.estimate.checks import EstimateError, Vector, checked_queries, checked_rows
-from lic_drake.estimate.estimator import Prediction, SuccessEstimator
+from lic_drake.estimate.checks import (
+    EstimateError,
+    Vector,
+    checked_queries,
+    checked_rows,
+    checked_weights,
+)
+from lic_drake.estimate.estimator import Prediction, UpdatableEstimator
 from lic_drake.seeds import make_generator
 
 MAX_ROWS = 2000
@@ -27,8 +33,8 @@ class StackedEstimator:
     """Estimates without the failure first, then what the failure changes.
 
     The second stage sees the first one's estimate and the start's place from the failed one. Both
-    learn from D2: every row is also a first reach. Satisfies `SuccessEstimator`; the spread is that
-    of the second stage.
+    learn from D2: every row is also a first reach. Satisfies `UpdatableEstimator`; the spread is
+    that of the second stage.
 
     Attributes:
         alone: Columns of z without the failure.
@@ -37,8 +43,8 @@ class StackedEstimator:
 
     def __init__(
         self,
-        make_first: Callable[[], SuccessEstimator],
-        make_second: Callable[[], SuccessEstimator],
+        make_first: Callable[[], UpdatableEstimator],
+        make_second: Callable[[], UpdatableEstimator],
         alone: NDArray[np.intp],
         matrix: Vector,
     ) -> None:
@@ -53,7 +59,7 @@ class StackedEstimator:
         self.alone = alone
         self.matrix = matrix
         self._make = make_first, make_second
-        self._stages: tuple[SuccessEstimator, SuccessEstimator] | None = None
+        self._stages: tuple[UpdatableEstimator, UpdatableEstimator] | None = None
 
     def fit(self, Z: ArrayLike, f: ArrayLike, environment: ArrayLike | None = None) -> Self:
         """Learns from rows of D2; see `Predictor`."""
@@ -68,6 +74,19 @@ class StackedEstimator:
         part = np.sort(rng.permutation(len(f))[:MAX_ROWS])
         second = self._make[1]().fit(self._second_features(first, Z[part]), f[part], known[part])
         self._stages = first, second
+        return self
+
+    def update(self, Z: ArrayLike, f: ArrayLike, weight: ArrayLike = 1.0) -> Self:
+        """Takes further rows of D2 in; see `UpdatableEstimator`.
+
+        The first stage takes each reach in once, however many failures go before it.
+        """
+        first, second = self._fitted()
+        Z, f = checked_rows(Z, f)
+        weights = checked_weights(weight, len(f))
+        reaches = np.unique(np.column_stack([f, weights, self._checked(Z)[:, self.alone]]), axis=0)
+        first.update(reaches[:, 2:], reaches[:, 0], reaches[:, 1])
+        second.update(self._second_features(first, Z), f, weights)
         return self
 
     def predict(self, Z: ArrayLike) -> Prediction:
@@ -90,13 +109,13 @@ class StackedEstimator:
         gradient[self.alone] += by_stage[0] * by_alone
         return value, gradient
 
-    def _second_features(self, first: SuccessEstimator, Z: Vector) -> Vector:
+    def _second_features(self, first: UpdatableEstimator, Z: Vector) -> Vector:
         return np.column_stack([first.values(Z[:, self.alone]), Z @ self.matrix.T])
 
     def _checked(self, Z: ArrayLike) -> Vector:
         return checked_queries(Z, self.matrix.shape[1])
 
-    def _fitted(self) -> tuple[SuccessEstimator, SuccessEstimator]:
+    def _fitted(self) -> tuple[UpdatableEstimator, UpdatableEstimator]:
         if self._stages is None:
             raise EstimateError("the stacked estimator has no rows yet; call fit(Z, f) first")
         return self._stages

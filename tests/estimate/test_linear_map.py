@@ -80,3 +80,12 @@ def test_neighbours_reach_beyond_the_pairs_that_every_environment_repeats() -> N
     truth = np.abs(new[:, 2] - new[:, 0]) < 0.2
     loss = [np.mean((e.values(new) - truth) ** 2) for e in (by_environment, by_situation)]
     assert loss[1] < 0.9 * loss[0]
+
+
+def test_further_rows_are_handed_on() -> None:
+    matrix = relative_features(FEATURES.first)
+    mapped = MappedEstimator(GaussianProcess(), matrix).fit(Z[:150], F[:150])
+    other = GaussianProcess().fit(np.round(Z[:150] @ matrix.T, 9), F[:150])
+    mapped.update(Z[150:], F[150:], 2.0)
+    other.update(np.round(Z[150:] @ matrix.T, 9), F[150:], 2.0)
+    np.testing.assert_allclose(mapped.values(Z[:20]), other.values(Z[:20] @ matrix.T), atol=1e-6)

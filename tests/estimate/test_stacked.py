@@ -3,6 +3,7 @@ import pytest
 
 from lic_drake.estimate.categories import features_of
 from lic_drake.estimate.checks import EstimateError
+from lic_drake.estimate.estimator import UpdatableEstimator
 from lic_drake.estimate.registry import make_estimator
 from lic_drake.estimate.stacked import StackedEstimator
 
@@ -66,3 +67,18 @@ def test_misuse_is_refused() -> None:
     Z, f, _ = pairs(20)
     with pytest.raises(EstimateError, match="20 rows need as many environments"):
         empty.fit(Z, f, np.zeros(19))
+
+
+@pytest.mark.parametrize("name", ["gp", "knn"])
+def test_it_goes_on_learning(name: str) -> None:
+    Z, f, environment = pairs(600)
+    estimator = make_estimator(name, FEATURES).fit(Z, f, environment)
+    assert isinstance(estimator, UpdatableEstimator)
+    asked = at((0.1, 0.0), (-0.3, 0.3))
+    before = estimator.values(asked[None])[0]
+    # Ten reaches, each after three failures, say that nothing succeeds there any more.
+    rng = np.random.default_rng(1)
+    rows = np.repeat(asked + rng.normal(0.0, 0.005, (10, len(asked))), 3, axis=0)
+    rows[:, EARLIER] += rng.normal(0.0, 0.01, (30, 2))
+    estimator.update(rows, np.zeros(30), 20.0)
+    assert estimator.values(asked[None])[0] < before - 0.3
