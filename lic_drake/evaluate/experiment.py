@@ -1,5 +1,6 @@
 """Trials of several strategies on the same unseen environments, in parallel and resumable."""
 
+import gc
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -238,6 +239,11 @@ class _Worker:
                     last = attempts[-1].record
                     won = last.success if watch is None else watch.touches_ball(last)
                     yield method, environment, goal, attempts, won
+                if watch is not None:
+                    # A renderer takes 150 MB, and its diagram is a reference cycle: only the
+                    # collector frees it.
+                    del watch
+                    gc.collect()
 
     def _watch(self, environment: int, p_WG: Vector) -> Watch | None:
         """Returns the cameras' watch over an environment; all strategies see the same."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from typing import cast
+from weakref import WeakMethod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +44,7 @@ class DisturbedCamera(LeafSystem):
         ):
             self.DeclareAbstractInputPort(name, Value(value))
         self.DeclareVectorInputPort("look", 1)
-        self.DeclareAbstractOutputPort("image", _make_nothing, self._calc_image)  # type: ignore[arg-type]
+        self.DeclareAbstractOutputPort("image", _make_nothing, _weakly(self._calc_image))
 
     def _calc_image(self, context: Context, output: AbstractValue) -> None:
         look = int(np.asarray(self.GetInputPort("look").Eval(context))[0])
@@ -67,7 +68,7 @@ class Detector(LeafSystem):
         super().__init__()
         self._find = find
         self.DeclareAbstractInputPort("image", _make_nothing())
-        self.DeclareAbstractOutputPort("found", _make_nothing, self._calc_found)  # type: ignore[arg-type]
+        self.DeclareAbstractOutputPort("found", _make_nothing, _weakly(self._calc_found))
 
     def _calc_found(self, context: Context, output: AbstractValue) -> None:
         image = cast(CameraImage, self.GetInputPort("image").Eval(context))
@@ -99,6 +100,21 @@ def camera_image(
         R_WC=np.array(X_WC.rotation().matrix()),
         p_WC=np.array(X_WC.translation()),
     )
+
+
+def _weakly(calc: Callable[[Context, AbstractValue], None]) -> Callable[[object, object], None]:
+    """Returns a method as a function that does not keep its system alive.
+
+    In Drake 1.58 an abstract output port keeps what it is given for ever, and with it the diagram.
+    """
+    method = WeakMethod(calc)
+
+    def call(context: object, output: object) -> None:
+        bound = method()
+        assert bound is not None  # A port dies with its system.
+        bound(cast(Context, context), cast(AbstractValue, output))
+
+    return call
 
 
 class _Nothing:

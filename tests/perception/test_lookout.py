@@ -1,5 +1,7 @@
 """The diagram of cameras and detectors against its parts, called one after the other."""
 
+import gc
+import weakref
 from dataclasses import replace
 from functools import partial
 
@@ -54,6 +56,14 @@ def test_what_a_detector_raises_comes_out_of_the_diagram() -> None:
     blind = Lookout(INSTANCE, P_WG, replace(CAMERAS, external=away), board_of(SCENARIO)[1], DRAW)
     with pytest.raises(PerceptionError, match="no yellow ball in view"):
         blind.look(0)
+
+
+def test_a_lookout_dies() -> None:
+    lookout = Lookout(INSTANCE, P_WG, CAMERAS, board_of(SCENARIO)[1], DRAW)
+    alive = weakref.ref(lookout.diagram)
+    del lookout
+    gc.collect()
+    assert alive() is None
 
 
 def test_the_robot_believes_what_it_saw(lookout: Lookout) -> None:
