@@ -29,7 +29,7 @@ from lic_drake.robots.pr2 import Pr2Arm
 from lic_drake.robots.pr2_inverse import ROBOT_TO_CLUTTER, solve_pointing
 from lic_drake.seeds import make_generator
 from lic_drake.select.objective import Objective, SuccessModel
-from lic_drake.select.pointing_lic import PointingLbfgsb, PointingLic
+from lic_drake.select.pointing_lic import PointingLbfgsb, PointingLic, is_apart
 from lic_drake.select.registry import fit_model
 from lic_drake.select.situation import FailedReach, Selection, Situation
 
@@ -118,11 +118,10 @@ def check_situation(
             situation = Situation(p_WG=p_WG, starts=starts, failed=failed)
             objective = PointingLic(first, second).objective(situation)
             began = time.perf_counter()
-            allowed = grid.take(situation.allowed(grid))
+            allowed = grid.take(is_apart(situation, grid))
             of_grid = float(objective.values(allowed).max(initial=-np.inf))
             candidates_s = time.perf_counter() - began
-            # A further attempt goes through another aperture.
-            others = sampled.take(situation.allowed(sampled))
+            others = sampled.take(is_apart(situation, sampled))
             best = best_possible(starts, others, objective.values(others))
             next_failed = failed
             for kind, optimiser in OPTIMISERS.items():

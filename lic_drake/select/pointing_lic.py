@@ -29,6 +29,13 @@ FINE_M = 0.003
 MAX_TRIED = 40
 """So many places at an aperture are tried, the best first, until the arm can be there."""
 
+RETRY_M = 0.1
+"""How far base and torso are at least from where they failed at the same aperture: a step of the
+grid, as in the plane; the "local neighborhood" of paper VI-A."""
+
+SAME_M = 0.05
+"""Apertures nearer to each other than this are the same one, seen twice."""
+
 MAX_GAIN = 0.02
 """Solving from the best place of the lattice gains no more than this: apertures further behind are
 left out."""
@@ -37,13 +44,13 @@ left out."""
 class PointingLic(LicSelector):
     """Optimises with a MathematicalProgram, at each aperture from its best place.
 
-    A further attempt goes through another aperture, with LIC-2, too: behind a board a failure tells
-    little but that this way in was wrong, and LIC-2 would choose it again after half of them.
+    A further attempt with LIC-2 goes through another aperture, or stands elsewhere: base and torso
+    at least `RETRY_M` from where they were.
     """
 
     def _candidates(self, situation: Situation) -> InitialConditions:
         grid = _pointing(situation).grid
-        return grid.take(situation.allowed(grid))
+        return grid.take(is_apart(situation, grid))
 
     def _chance(self, situation: Situation, conditions: InitialConditions) -> Vector:
         return _pointing(situation).chance(conditions.x0)
@@ -75,8 +82,9 @@ class PointingLic(LicSelector):
             nearby = self._values(situation, objective, x0, fine)
             start = _first_possible(starts, x0[:3], fine, nearby) or start
             for pose, b0 in (start, self._solve(starts, objective, *start)):
-                if starts.angles(pose, b0[:2], b0[2]) is not None:
-                    condition = InitialConditions(pose[None], b0[None, :2], b0[2:])
+                condition = InitialConditions(pose[None], b0[None, :2], b0[2:])
+                possible = starts.angles(pose, b0[:2], b0[2]) is not None
+                if possible and is_apart(situation, condition)[0]:
                     yield condition
                     best = max(best, float(objective.values(condition)[0]))
 
@@ -87,8 +95,8 @@ class PointingLic(LicSelector):
         at = InitialConditions(
             np.tile(x0, (len(places), 1)), places[:, :2].copy(), places[:, 2].copy()
         )
-        values: Vector = objective.values(at) * self._chance(situation, at)
-        return values
+        values = objective.values(at) * self._chance(situation, at)
+        return np.where(is_apart(situation, at), values, -np.inf)
 
     def _solve(
         self, starts: PointingStarts, objective: SuccessObjective, x0: Vector, b0: Vector
@@ -140,6 +148,16 @@ def _pose(p_WA: Vector, half_roll: float) -> Vector:
     return np.concatenate([p_WA, wxyz if wxyz[0] >= 0.0 else -wxyz]) + 0.0
 
 
+def is_apart(situation: Situation, conditions: InitialConditions) -> NDArray[np.bool_]:
+    """Tells which of n initial conditions are not those that failed, nor near them, shape (n,)."""
+    apart = np.ones(len(conditions), dtype=bool)
+    for failed in situation.failed:
+        same = np.linalg.norm(conditions.x0[:, :3] - failed.x0[:3], axis=1) < SAME_M
+        place = np.array([*failed.p_WR, failed.torso_m])
+        apart &= ~same | (np.linalg.norm(conditions.b0 - place, axis=1) >= RETRY_M)
+    return apart
+
+
 def _lattice(stand: Stand, step_m: float) -> Vector:
     """Returns places of the base and heights of the torso, shape (n, 3), metres."""
     y = _steps(stand.y_min_m, stand.y_max_m, step_m)
@@ -170,6 +188,8 @@ def _first_possible(
 ) -> tuple[Vector, Vector] | None:
     """Returns tool pose and place, shape (7,) and (3,), of the best place where the arm can be."""
     for i in np.argsort(-values, kind="stable")[:MAX_TRIED]:
+        if values[i] == -np.inf:
+            break
         b0 = _inside(starts, places[i])
         found = starts.pre_select(p_WA, b0)
         if found is not None:

@@ -4,6 +4,7 @@ from pr2_reaches import SCENARIO
 from pr2_reference import link_poses
 
 from lic_drake.errors import RequestError
+from lic_drake.estimate.categories import features_of
 from lic_drake.estimate.features import SPACE_LIC1
 from lic_drake.experience.second_reach import SHOWN
 from lic_drake.reach.initial_conditions import InitialConditions
@@ -12,7 +13,7 @@ from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.starts import make_starts, planar_starts
 from lic_drake.select.baselines import CostSelector, RandomSelector, corridor_cost
 from lic_drake.select.objective import SuccessModel
-from lic_drake.select.pointing_lic import PointingLbfgsb, PointingLic
+from lic_drake.select.pointing_lic import RETRY_M, PointingLbfgsb, PointingLic, is_apart
 from lic_drake.select.registry import make_selector
 from lic_drake.select.situation import FailedReach, Situation
 
@@ -173,6 +174,39 @@ def test_no_place_between_those_of_the_grid_is_better() -> None:
             at = InitialConditions(found[0][None], b0[None, :2], b0[2:])
             value = selector.objective(asked).values(at)[0]
             assert chosen.probability is not None and chosen.probability > value - 0.01
+
+
+def test_a_further_attempt_with_lic_2_does_not_begin_where_the_first_one_failed() -> None:
+    model = SuccessModel(
+        estimator=Blind(),  # type: ignore[arg-type]
+        features=features_of("sphere-aperture-clutter").second,
+    )
+    selector = PointingLic(MODEL, model)
+    first = selector.select(situation(0))
+    shown = dict.fromkeys(SHOWN, 0.0)
+    failed = FailedReach(x0=first.x0, p_WR=first.p_WR, shown=shown, torso_m=first.torso_m)
+    second = selector.select(situation(0, failed))
+    moved = np.linalg.norm([*(second.p_WR - first.p_WR), second.torso_m - first.torso_m])
+    assert np.linalg.norm(second.x0[:3] - first.x0[:3]) > 0.19 or moved >= RETRY_M
+    # As seen again, the aperture is the same one.
+    seen = FailedReach(
+        x0=first.x0 + [0, 0.01, *np.zeros(5)], p_WR=first.p_WR, shown=shown, torso_m=first.torso_m
+    )
+    at = InitialConditions(first.x0[None], first.p_WR[None], np.array([first.torso_m]))
+    assert not is_apart(situation(0, seen), at)[0]
+
+
+class Blind:
+    """Estimates with LIC-2's features that do not care for the failed reach."""
+
+    def values(self, Z: np.ndarray) -> np.ndarray:
+        return Ridge().values(Z[:, [0, 1, 4, 5, 6]])
+
+    def value_and_gradient(self, z: np.ndarray) -> tuple[float, np.ndarray]:
+        value, gradient = Ridge().value_and_gradient(z[[0, 1, 4, 5, 6]])
+        whole = np.zeros(7)
+        whole[[0, 1, 4, 5, 6]] = gradient
+        return value, whole
 
 
 def test_a_planar_situation_is_refused() -> None:
