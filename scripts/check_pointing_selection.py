@@ -28,7 +28,7 @@ from lic_drake.reach.scenario import parse_scenario
 from lic_drake.robots.pr2 import Pr2Arm
 from lic_drake.robots.pr2_inverse import ROBOT_TO_CLUTTER, solve_pointing
 from lic_drake.seeds import make_generator
-from lic_drake.select.objective import Objective, SuccessModel
+from lic_drake.select.objective import SuccessModel, SuccessObjective
 from lic_drake.select.pointing_lic import PointingLbfgsb, PointingLic, is_apart
 from lic_drake.select.registry import fit_model
 from lic_drake.select.situation import FailedReach, Selection, Situation
@@ -147,7 +147,7 @@ def check_situation(
     return found
 
 
-def _value(objective: Objective, chosen: Selection) -> float:
+def _value(objective: SuccessObjective, chosen: Selection) -> float:
     condition = InitialConditions(chosen.x0[None], chosen.p_WR[None], np.array([chosen.torso_m]))
     return float(objective.values(condition)[0])
 
