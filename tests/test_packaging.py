@@ -35,7 +35,12 @@ FLOW = (
 )
 """Rooms from left to right; a module imports only from its own room and from rooms to its left."""
 
-IMPORT_NAMES = {"drake": "pydrake", "scikit-image": "skimage", "scikit-learn": "sklearn"}
+IMPORT_NAMES = {
+    "drake": "pydrake",
+    "pillow": "PIL",
+    "scikit-image": "skimage",
+    "scikit-learn": "sklearn",
+}
 BROUGHT_BY_DRAKE = {"matplotlib", "mpl_toolkits", "pydot", "yaml"}
 
 

@@ -16,9 +16,9 @@ def worn(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Any]:
     """What demonstrations were asked to wear."""
     worn: list[Any] = []
 
-    def demonstrate(*args: Any, meshes: list[Any]) -> Demonstration:
+    def demonstrate(*args: Any, meshes: list[Any], cameras: Any) -> Demonstration:
         worn.append([mesh.path.stem for mesh in meshes])
-        return Demonstration(p_WG=args[0], attempts=[], files={})
+        return Demonstration(p_WG=args[0], attempts=[], success=False, files={})
 
     monkeypatch.setattr(demonstration, "demonstrate", demonstrate)
     go_offline(monkeypatch, tmp_path)

@@ -50,7 +50,7 @@ def test_unknown_files_and_keys_are_named(tmp_path: Path) -> None:
         (CameraConfig(), {"focal_px": 0.0}, "focal_px must be a positive number"),
         (CameraConfig(), {"nearest_m": 6.0}, "nearest_m < furthest_m"),
         (HeadConfig(), {"base_pose": [0.0, 1.0]}, r"base_pose must be \[x, y, heading\]"),
-        (ExternalConfig(), {"p_WC": [0.84, -0.19, 3.0]}, "cannot look straight up or down"),
+        (ExternalConfig(), {"p_WC": [0.84, -0.29, 3.0]}, "cannot look straight up or down"),
         (CamerasConfig(), {"ball_radius_m": 0.0}, "ball_radius_m must be between"),
     ],
 )
