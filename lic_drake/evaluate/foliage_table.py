@@ -1,13 +1,9 @@
 """Success of the PR2 before foliage, which the paper demonstrates once on the robot (V-B)."""
 
-import numpy as np
-from numpy.typing import NDArray
-
 from lic_drake.evaluate.paper import label
-from lic_drake.evaluate.statistics import mcnemar
+from lic_drake.evaluate.space_table import SUCCESS_HEADS, success_cells
 from lic_drake.evaluate.table import Table
 from lic_drake.evaluate.trials import TrialTable
-from lic_drake.intervals import wilson_interval
 
 CONDITIONS = {"cameras": "seen by cameras", "known": "known"}
 """How the robot knows apertures and goal, by the variant of the trials."""
@@ -40,38 +36,13 @@ def foliage_table(trials: TrialTable) -> Table:
             if rows and strategies:
                 rows.append(None)
             won = {name: trials.success(m, attempts, v) for name, m, v in strategies}
-            rows += [(words, part, name, *_figures(name, won)) for name in won]
+            rows += [(words, part, name, *success_cells(name, won)) for name in won]
     return Table(
         caption="The PR2 before foliage, 8 of 20 apertures covered, 2 of them in part: unseen"
         " environments with a random goal each, the same for all strategies. Base and torso move."
         " LIC learned from reaches among spheres or among foliage. With cameras, a reach is a"
         " success if it ends in the ball. Intervals are Wilson's, 90 %; p is McNemar's exact paired"
         " test.",
-        heading=(
-            "apertures and goal",
-            "attempt",
-            "strategy",
-            "success, %",
-            "90 % interval",
-            "count",
-            "p against RND",
-            "p against COST",
-        ),
+        heading=("apertures and goal", "attempt", "strategy", *SUCCESS_HEADS),
         rows=tuple(rows),
-    )
-
-
-def _figures(name: str, won: dict[str, NDArray[np.bool_]]) -> tuple[str, ...]:
-    """Returns the cells of a strategy."""
-    mine = won[name]
-    low, high = wilson_interval(int(mine.sum()), len(mine))
-    against = [
-        f"{mcnemar(mine, won[other]):.2g}" if other in won and other != name else ""
-        for other in (label("rnd"), label("cost"))
-    ]
-    return (
-        f"{100 * mine.mean():.1f}",
-        f"{100 * low:.1f}..{100 * high:.1f}",
-        f"{mine.sum()}/{len(mine)}",
-        *against,
     )

@@ -1,5 +1,10 @@
 """Success of the PR2 in sphere-aperture-clutter, which the paper only demonstrates (V-B)."""
 
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
 from lic_drake.evaluate.paper import label
 from lic_drake.evaluate.statistics import mcnemar
 from lic_drake.evaluate.table import Table
@@ -9,6 +14,10 @@ from lic_drake.intervals import wilson_interval
 
 STANDS = {"": "move along the board", "still": "stay"}
 """What base and torso do, by the variant of the trials."""
+
+
+SUCCESS_HEADS = ("success, %", "90 % interval", "count", "p against RND", "p against COST")
+"""Heads of the cells that say how a strategy did."""
 
 
 def space_table(trials: TrialTable) -> Table:
@@ -26,40 +35,33 @@ def space_table(trials: TrialTable) -> Table:
         for part, attempts in (("1st attempt", 1), ("total of two", 2)):
             if rows and methods:
                 rows.append(None)
-            for method in methods:
-                won = trials.success(method, attempts, variant)
-                low, high = wilson_interval(int(won.sum()), len(won))
-                against = []
-                for other in ("rnd", "cost"):
-                    if other == method or other not in methods:
-                        against.append("")
-                        continue
-                    p = mcnemar(won, trials.success(other, attempts, variant))
-                    against.append(f"{p:.2g}")
-                rows.append(
-                    (
-                        stand,
-                        part,
-                        label(method),
-                        f"{100 * won.mean():.1f}",
-                        f"{100 * low:.1f}..{100 * high:.1f}",
-                        f"{won.sum()}/{len(won)}",
-                        *against,
-                    )
-                )
+            won = {label(m): trials.success(m, attempts, variant) for m in methods}
+            rows += [(stand, part, name, *success_cells(name, won)) for name in won]
     return Table(
         caption="The PR2 in sphere-aperture-clutter with 10 of 20 apertures blocked: unseen"
         " environments with a random goal each, the same for all strategies. Intervals are"
         " Wilson's, 90 %; p is McNemar's exact paired test.",
-        heading=(
-            "base and torso",
-            "attempt",
-            "strategy",
-            "success, %",
-            "90 % interval",
-            "count",
-            "p against RND",
-            "p against COST",
-        ),
+        heading=("base and torso", "attempt", "strategy", *SUCCESS_HEADS),
         rows=tuple(rows),
+    )
+
+
+def success_cells(name: str, won: Mapping[str, NDArray[np.bool_]]) -> tuple[str, ...]:
+    """Returns the cells of a strategy under `SUCCESS_HEADS`.
+
+    Args:
+        name: The strategy.
+        won: Success of each trial by strategy, each of shape (n,), in the same trials.
+    """
+    mine = won[name]
+    low, high = wilson_interval(int(mine.sum()), len(mine))
+    against = [
+        f"{mcnemar(mine, won[other]):.2g}" if other in won and other != name else ""
+        for other in (label("rnd"), label("cost"))
+    ]
+    return (
+        f"{100 * mine.mean():.1f}",
+        f"{100 * low:.1f}..{100 * high:.1f}",
+        f"{mine.sum()}/{len(mine)}",
+        *against,
     )

@@ -37,8 +37,7 @@ SAME_M = 0.05
 """Apertures nearer to each other than this are the same one, seen twice."""
 
 MAX_GAIN = 0.02
-"""Solving from the best place of the lattice gains no more than this: apertures further behind are
-left out."""
+"""Apertures whose best place of the lattice is estimated this much below the best are left out."""
 
 
 class PointingLic(LicSelector):
@@ -86,7 +85,8 @@ class PointingLic(LicSelector):
                 possible = starts.angles(pose, b0[:2], b0[2]) is not None
                 if possible and is_apart(situation, condition)[0]:
                     yield condition
-                    best = max(best, float(objective.values(condition)[0]))
+                    value = objective.values(condition) * self._chance(situation, condition)
+                    best = max(best, float(value[0]))
 
     def _values(
         self, situation: Situation, objective: SuccessObjective, x0: Vector, places: Vector
