@@ -13,6 +13,7 @@ from lic_drake.evaluate.batch import random_requests
 from lic_drake.reach.environment import Environment
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.stem_waking import StemWakingSimulation
 from lic_drake.reach.waking import WakingSimulation
 
 
@@ -90,6 +91,7 @@ def measure_reaches(scenario: Scenario, reaches: int, per_environment: int = 5) 
         Stopwatch(HapticMpcController, "_update") as controller,
         Stopwatch(Simulator, "AdvanceTo") as stepping,
         Stopwatch(WakingSimulation, "_with_spares") as build,
+        Stopwatch(StemWakingSimulation, "_with_awake") as build_stems,
         Stopwatch(Environment, "_all_awake") as build_awake,
     ):
         began = time.perf_counter()
@@ -101,7 +103,7 @@ def measure_reaches(scenario: Scenario, reaches: int, per_environment: int = 5) 
         "physics": stepping.seconds - controller.seconds + contacts.seconds,
         "sensor": sensor.seconds - contacts.seconds,
         "mpc": controller.seconds,
-        "build": build.seconds + build_awake.seconds,
+        "build": build.seconds + build_stems.seconds + build_awake.seconds,
     }
     seconds["rest"] = total - sum(seconds.values())
     return ReachSpeed(

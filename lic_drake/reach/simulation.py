@@ -1,10 +1,7 @@
 """A reach under way in a diagram: its context, its simulator and what the rollout reads."""
 
-from collections.abc import Iterable
-
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import CollisionFilterDeclaration, FilterId, GeometrySet
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from lic_drake.reach.diagram import ReachDiagram
@@ -39,11 +36,6 @@ class Simulation:
             -1, self._num_axes
         )
         self._taxel_force = reach_diagram.diagram.GetOutputPort("taxel_force")
-        scene_graph = scene.scene_graph
-        self._filters = scene_graph.collision_filter_manager(
-            scene_graph.GetMyMutableContextFromRoot(self._context)
-        )
-        self._hidden: list[FilterId] = []
 
     @property
     def num_movable(self) -> int:
@@ -63,9 +55,6 @@ class Simulation:
             p_WG: Goal, shape (3,), metres.
             time_s: Time on the clock, seconds.
         """
-        for hidden in self._hidden:
-            self._filters.RemoveDeclaration(hidden)
-        self._hidden.clear()
         self._context.SetTime(time_s)
         self._reach_diagram.set_start(self._context, q, p_WG)
         p_WO = self._p_WO_first
@@ -162,16 +151,3 @@ class Simulation:
         held = theirs.GetMyContextFromRoot(other._context).get_discrete_state()
         state = mine.GetMyMutableContextFromRoot(self._context).get_mutable_discrete_state()
         state.SetFrom(held)
-
-    def hide(self, objects: Iterable[int]) -> None:
-        """Lets objects touch nothing any more, until the next reach begins.
-
-        Args:
-            objects: Indices into the objects of the diagram's instance.
-        """
-        scene = self._reach_diagram.scene
-        declaration = CollisionFilterDeclaration().ExcludeBetween(
-            GeometrySet([scene.objects[i] for i in objects]),
-            GeometrySet([*scene.skin_links, *scene.objects]),
-        )
-        self._hidden.append(self._filters.ApplyTransient(declaration))

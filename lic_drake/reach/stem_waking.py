@@ -47,15 +47,6 @@ class StemWakingSimulation(PartlyAsleep):
         self._now = self._with_awake()
         self._now.begin(q, p_WG, time_s)
 
-    def find_free(self, angles: Vector) -> Vector | None:
-        """Returns the first joint angles with which the arm touches nothing; see `Simulation`."""
-        for q in angles:
-            self.begin(q, self._p_WG)
-            if not self.is_in_collision():
-                free: Vector = q
-                return free
-        return None
-
     def state(self) -> SceneState:
         """Returns the present state of the arm and of all stems that can bend."""
         now = self._now.state()

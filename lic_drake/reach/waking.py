@@ -15,13 +15,16 @@ from lic_drake.scene.sleep import SkinAxes, SleepMonitor, put_to_sleep
 Vector = NDArray[np.float64]
 
 FEWEST_SPARES = 2
-"""Spare objects of the first diagram that has any; every further one has twice as many."""
+"""Spare objects of the first diagram that has any; every further one has twice as many. Their
+number is part of a record's last digits: more spares than before, in one of ten reaches of the PR2
+the solver adds in another order."""
 
 
 class PartlyAsleep(ABC):
-    """A simulation of which the sleeping part is fixed or left out, used as a `Simulation`."""
+    """A simulation without what sleeps in it, used as a `Simulation`."""
 
     _now: Simulation
+    _p_WG: Vector
 
     @abstractmethod
     def begin(self, q: Vector, p_WG: Vector, time_s: float = 0.0) -> None:
@@ -54,7 +57,12 @@ class PartlyAsleep(ABC):
 
     def find_free(self, angles: Vector) -> Vector | None:
         """Returns the first joint angles with which the arm touches nothing; see `Simulation`."""
-        return self._now.find_free(angles)
+        for q in angles:
+            self.begin(q, self._p_WG)
+            if not self.is_in_collision():
+                free: Vector = q
+                return free
+        return None
 
     def advance_to(self, time_s: float) -> None:
         """Simulates up to a time; see `Simulation.advance_to`."""
@@ -72,8 +80,8 @@ class PartlyAsleep(ABC):
 class WakingSimulation(PartlyAsleep):
     """A `Simulation` of an environment with all its movable objects, most of them asleep.
 
-    An object that wakes up is replaced by a spare, and its fixed copy touches nothing any more.
-    When the spares do not suffice, the reach goes on in a diagram with more of them.
+    Those are left out; for an object that wakes up a spare takes its place. When the spares do not
+    suffice, the reach goes on in a diagram with more of them.
     """
 
     def __init__(
@@ -83,7 +91,7 @@ class WakingSimulation(PartlyAsleep):
         self._instance = instance
         self._torso_m = torso_m
         self._axes = SkinAxes(scenario.arm(torso_m), instance.num_axes)
-        self._objects = np.flatnonzero(instance.movable)
+        self._num_movable = int(np.count_nonzero(instance.movable))
         self._by_spares: dict[int, Simulation] = {}
 
     def begin(self, q: Vector, p_WG: Vector, time_s: float = 0.0) -> None:
@@ -99,7 +107,8 @@ class WakingSimulation(PartlyAsleep):
         """Returns the present state of the arm and of all movable objects."""
         now, n = self._now.state(), len(self._awake)
         p_WO, v_WO = self._monitor.p_WO.copy(), np.zeros_like(self._monitor.p_WO)
-        p_WO[self._awake], v_WO[self._awake] = now.p_WO[:n], now.v_WO[:n]
+        if n:
+            p_WO[self._awake], v_WO[self._awake] = now.p_WO[:n], now.v_WO[:n]
         return SceneState(q=now.q, v=now.v, p_WO=p_WO, v_WO=v_WO)
 
     def look_around(self, q: Vector) -> None:
@@ -114,15 +123,13 @@ class WakingSimulation(PartlyAsleep):
         self._awake += woken
         n = len(self._awake)
         if n > before.num_movable:
-            self._now = self._with_spares(_enough_spares(n, len(self._objects)))
+            self._now = self._with_spares(self._enough_spares(n))
             self._now.begin(state.q, self._p_WG, before.time_s)
             self._now.take_over_control(before)
-            woken = self._awake
         spares = self._now.state()
         p_WO, v_WO = spares.p_WO.copy(), spares.v_WO.copy()
         p_WO[:n], v_WO[:n] = state.p_WO[self._awake], state.v_WO[self._awake]
         self._now.set_state(SceneState(q=state.q, v=state.v, p_WO=p_WO, v_WO=v_WO))
-        self._now.hide(self._objects[woken])
 
     def _with_spares(self, spares: int) -> Simulation:
         if spares not in self._by_spares:
@@ -131,9 +138,8 @@ class WakingSimulation(PartlyAsleep):
             self._by_spares[spares] = Simulation(diagram, self._scenario.scene)
         return self._by_spares[spares]
 
-
-def _enough_spares(awake: int, num_movable: int) -> int:
-    spares = FEWEST_SPARES
-    while spares < awake:
-        spares *= 2
-    return min(spares, num_movable)
+    def _enough_spares(self, awake: int) -> int:
+        spares = FEWEST_SPARES
+        while spares < awake:
+            spares *= 2
+        return min(spares, self._num_movable)

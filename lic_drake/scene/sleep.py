@@ -1,8 +1,8 @@
-"""Movable objects sleep: they stand in the scene as fixed ones until something comes near.
+"""Movable objects sleep: they are left out of the scene until something comes near.
 
 An object that nothing touches stands still, held by the ground's dry friction, and acts on nothing.
-So nothing changes if it is fixed while it is untouched, but a step of the plant costs a third. Here
-is decided, from distances at the control instants, when an object has to wake up.
+So nothing changes if it is not there while it is untouched, but a step of the plant costs a third.
+Here is decided, from distances at the control instants, when an object has to wake up.
 """
 
 import math
@@ -49,17 +49,17 @@ def can_sleep(instance: ClutterInstance) -> bool:
 
 
 def put_to_sleep(instance: ClutterInstance, spares: int) -> ClutterInstance:
-    """Returns the instance with all its objects fixed, followed by parked movable spares.
+    """Returns the fixed objects of an instance, followed by parked movable spares.
 
     Args:
         instance: An environment that can sleep.
         spares: Number of objects that can be awake at a time.
     """
-    n, first = instance.num_objects, int(np.argmax(instance.movable))
-    picked = instance.picked(np.r_[np.arange(n), np.full(spares, first)])
-    p_WO = picked.p_WO.copy()
+    fixed, first = np.flatnonzero(~instance.movable), int(np.argmax(instance.movable))
+    picked = instance.picked(np.r_[fixed, np.full(spares, first)])
+    n, p_WO = len(fixed), picked.p_WO.copy()
     p_WO[n:, : instance.num_axes] = PARKING_M + np.arange(spares)[:, np.newaxis]
-    return replace(picked, p_WO=p_WO, movable=np.arange(n + spares) >= n)
+    return replace(picked, p_WO=p_WO)
 
 
 class SkinAxes:

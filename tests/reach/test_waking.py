@@ -81,6 +81,17 @@ def test_no_sleeper_takes_part_in_the_dynamics() -> None:
     assert simulation._now.num_movable < 5
 
 
+def test_a_sleeper_is_in_the_way_of_a_start() -> None:
+    scenario = free_space()
+    q = start_angles(scenario)
+    elsewhere = q + [0.3, 0.0, 0.0]
+    tip = scenario.arm().tip_position(elsewhere)
+    simulation = WakingSimulation(scenario, make_clutter(cylinder(*tip[:2], movable=True)))
+    simulation.begin(elsewhere, P_WG)
+    np.testing.assert_array_equal(simulation.find_free(np.array([elsewhere, q])), q)
+    assert simulation.find_free(elsewhere[None]) is None
+
+
 def test_waking_up_changes_neither_places_nor_speeds() -> None:
     scenario = free_space(10.0)
     simulation = WakingSimulation(scenario, row(0.52, 4))

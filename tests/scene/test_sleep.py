@@ -125,21 +125,20 @@ def test_a_pushed_object_that_moves_too_far_is_told() -> None:
         monitor.look(Q, p_WO + [1.6 * MAX_MOVE_M, 0.0])
 
 
-def test_everything_is_fixed_and_spares_are_parked() -> None:
+def test_sleepers_are_left_out_and_spares_are_parked() -> None:
     asleep = put_to_sleep(CROWD, 3)
-    n = CROWD.num_objects
-    assert asleep.num_objects == n + 3
+    fixed = np.flatnonzero(~CROWD.movable)
+    n, like = len(fixed), int(np.argmax(CROWD.movable))
     assert asleep.movable.tolist() == [False] * n + [True] * 3
-    np.testing.assert_array_equal(asleep.p_WO[:n], CROWD.p_WO)
+    np.testing.assert_array_equal(asleep.p_WO[:n], CROWD.p_WO[fixed])
     assert asleep.p_WO[n:, :2].min() >= PARKING_M
     apart = asleep.p_WO[n:, None, 0] - asleep.p_WO[None, n:, 0]
     assert np.abs(apart[~np.eye(3, dtype=bool)]).min() > 10 * RADIUS
-    like = int(np.argmax(CROWD.movable))
     for name in ("size", "mass", "yaw"):
         values = getattr(asleep, name)
         np.testing.assert_array_equal(values[n:], [getattr(CROWD, name)[like]] * 3)
-        np.testing.assert_array_equal(values[:n], getattr(CROWD, name))
-    assert asleep.shape == (*CROWD.shape, *("cylinder",) * 3)
+        np.testing.assert_array_equal(values[:n], getattr(CROWD, name)[fixed])
+    assert asleep.shape == (*(CROWD.shape[i] for i in fixed), *("cylinder",) * 3)
 
 
 @pytest.mark.parametrize(
