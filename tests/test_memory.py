@@ -24,7 +24,7 @@ from worlds import box, cylinder, make_clutter
 from lic_drake.control.mpc import HapticMpc
 from lic_drake.evaluate.batch import random_requests
 from lic_drake.reach import environment as reach_environment
-from lic_drake.reach import recording, rollout, waking
+from lic_drake.reach import recording, rollout, simulation_pool
 from lic_drake.reach.diagram import ReachDiagram, make_reach_diagram
 from lic_drake.reach.environment import Environment
 from lic_drake.reach.pointing_starts import pointing_starts
@@ -32,6 +32,7 @@ from lic_drake.reach.recording import ReachRecording
 from lic_drake.reach.request import make_request
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import load_scenario
+from lic_drake.reach.simulation_pool import SimulationPool
 
 pytestmark = pytest.mark.skipif(
     not Path("/proc/self/statm").exists(), reason="the memory is read from Linux's /proc"
@@ -49,11 +50,17 @@ def built(monkeypatch: pytest.MonkeyPatch) -> Iterator[list["weakref.ref[Any]"]]
         references.extend(weakref.ref(item) for item in (reach_diagram.diagram, *systems))
         return reach_diagram
 
-    rollout._environments.clear()
-    for module in (reach_environment, recording, waking):
+    forget()
+    for module in (reach_environment, recording, simulation_pool):
         monkeypatch.setattr(module, "make_reach_diagram", make)
     yield references
+    forget()
+
+
+def forget() -> None:
+    """Drops the environments and the simulations of this process."""
     rollout._environments.clear()
+    rollout._pool = SimulationPool()
 
 
 def alive(references: list["weakref.ref[Any]"]) -> list[str]:
@@ -64,28 +71,38 @@ def alive(references: list["weakref.ref[Any]"]) -> list[str]:
 ONE_DIAGRAM = ["controller", "plant", "reach", "scene_graph", "sensor", "standstill"]
 
 
-def test_only_the_diagram_of_the_last_environment_stays(built: list["weakref.ref[Any]"]) -> None:
-    for environment in range(5):
-        run_reach(reach_request(small_clutter(0.2), environment=environment))
-    assert len(built) == 5 * len(ONE_DIAGRAM)
-    assert alive(built) == ONE_DIAGRAM
-    rollout._environments.clear()
-    assert alive(built) == []
-
-
-def test_diagrams_of_other_bases_and_histories_die_with_the_environment(
+def test_environments_bases_and_histories_share_a_diagram(
     built: list["weakref.ref[Any]"],
 ) -> None:
     request = reach_request(small_clutter(0.04))
-    x0 = np.array(request.start)
-    run_reach(request)
+    for environment in range(5):
+        run_reach(replace(request, environment=environment))
     run_reach(replace(request, base=(0.0, 0.05)))
-    run_reach(request.then(x0, np.zeros(2)))
-    assert alive(built) == sorted(3 * ONE_DIAGRAM)
-    run_reach(replace(request, environment=1))
+    run_reach(request.then(np.array(request.start), np.zeros(2)))
+    assert len(built) == len(ONE_DIAGRAM)
     assert alive(built) == ONE_DIAGRAM
-    rollout._environments.clear()
+    forget()
     assert alive(built) == []
+
+
+def test_only_the_diagram_of_the_last_environment_stays_where_nothing_sleeps(
+    built: list["weakref.ref[Any]"],
+) -> None:
+    for environment in range(3):
+        run_reach(reach_request(small_clutter(0.04), environment=environment), sleep=False)
+    assert len(built) == 3 * len(ONE_DIAGRAM)
+    assert alive(built) == ONE_DIAGRAM
+
+
+def test_a_pool_keeps_a_limited_number_of_diagrams(
+    built: list["weakref.ref[Any]"], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(simulation_pool, "MAX_SIMULATIONS", 2)
+    for count in range(5):
+        scenario = load_scenario("cylinder-clutter", f"{{clutter: {{num_fixed: {count}}}}}")
+        run_reach(reach_request(replace(scenario, stop=free_space(0.04).stop)))
+    assert len(built) == 5 * len(ONE_DIAGRAM)
+    assert len(alive(built)) <= 2 * len(ONE_DIAGRAM)
 
 
 def test_a_reach_in_contact_leaves_nothing(built: list["weakref.ref[Any]"]) -> None:
@@ -108,7 +125,7 @@ def test_reaches_of_the_pr2_leave_nothing(built: list["weakref.ref[Any]"]) -> No
         p_WG = scenario.goals("training", environment)[4]
         run_reach(make_request(scenario, "training", environment, p_WG, starts.x0[7]))
     assert len(built) >= 2 * len(ONE_DIAGRAM)
-    rollout._environments.clear()
+    forget()
     assert alive(built) == []
 
 
@@ -126,7 +143,7 @@ def test_failures_and_invalid_starts_leave_nothing(
     ]
     outcomes = [run_reach(request).outcome for request in requests]
     assert outcomes == ["diverged", "invalid_start", "unreachable"]
-    rollout._environments.clear()
+    forget()
     assert alive(built) == []
 
 
@@ -149,7 +166,7 @@ def test_the_collector_is_not_left_to_chance(built: list["weakref.ref[Any]"]) ->
     gc.disable()
     try:
         for environment in range(3):
-            run_reach(reach_request(small_clutter(0.04), environment=environment))
+            run_reach(reach_request(small_clutter(0.04), environment=environment), sleep=False)
         left = [item for reference in built if (item := reference()) is not None]
         assert len(left) == len(ONE_DIAGRAM)
     finally:

@@ -7,6 +7,7 @@ from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 from lic_drake.control.mpc import HapticMpc, MpcInput
 from lic_drake.control.mpc_config import MpcConfig
 from lic_drake.control.taxels import TaxelLayout
+from lic_drake.control.torso import RaisableArm
 from lic_drake.robots.arm import Arm
 
 
@@ -19,11 +20,13 @@ class HapticMpcController(LeafSystem):
         goal: p_RG, size 3, metres.
     Output port:
         desired_state: [q_d, 0], size 2 m, rad and rad/s, held between control steps.
+    Parameter:
+        Height of the torso that carries the arm, metres; see `arm`.
     """
 
     def __init__(self, arm: Arm, layout: TaxelLayout, config: MpcConfig) -> None:
         super().__init__()
-        self._arm = arm
+        self.arm = RaisableArm(self, arm)
         self._layout = layout
         self._mpc = HapticMpc(config, arm.stiffness, arm.q_min, arm.q_max)
         self._num_joints = len(arm.q_min)
@@ -49,17 +52,18 @@ class HapticMpcController(LeafSystem):
 
         loaded = np.flatnonzero(taxel_force > self._mpc.config.force_trim_N)
         links = self._layout.link[loaded]
-        R_RL, p_RL = self._arm.link_poses(q)
+        arm = self.arm.at(context)
+        R_RL, p_RL = arm.link_poses(q)
         turn = R_RL[links]
         p_RC = p_RL[links] + np.vecdot(turn, self._layout.p_LT[loaded, None])
         state = MpcInput(
             q=q,
             q_d=q_d,
-            p_EG=p_RG - self._arm.tip_position(q),
-            Jv_E=self._arm.tip_jacobian(q),
+            p_EG=p_RG - arm.tip_position(q),
+            Jv_E=arm.tip_jacobian(q),
             normals=np.vecdot(turn, self._layout.n_L[loaded, None]),
             forces=taxel_force[loaded],
-            Jv_C=self._arm.point_jacobians(q, links, p_RC),
+            Jv_C=arm.point_jacobians(q, links, p_RC),
         )
         desired = np.zeros(2 * m)
         desired[:m] = q_d + self._mpc.step(state)

@@ -14,6 +14,7 @@ from lic_drake.control.mpc_controller import HapticMpcController
 from lic_drake.control.surface_taxels import make_taxels
 from lic_drake.control.tactile_sensor import TactileSensor
 from lic_drake.reach.scenario import Scenario
+from lic_drake.scene.furnish import raise_torso
 from lic_drake.scene.scene import Scene, add_scene
 
 
@@ -22,12 +23,15 @@ class ReachDiagram:
     """A built diagram and what a rollout needs of it.
 
     The diagram's input port is `goal` (p_WG, 3); its output ports are `arm_state` ([q, v]),
-    `clutter_state` ([p, v] of the movable objects), `taxel_force` and `desired_state`.
+    `clutter_state` ([p, v] of the movable objects), `taxel_force` and `desired_state`. The height
+    of the torso is a parameter.
     """
 
     diagram: Diagram
     scene: Scene
+    sensor: TactileSensor
     controller: HapticMpcController
+    torso_frame: str
     visualizer: MeshcatVisualizer | None
 
     def set_start(
@@ -41,6 +45,13 @@ class ReachDiagram:
         )
         self.controller.set_equilibrium(self.controller.GetMyMutableContextFromRoot(context), q)
         self.diagram.GetInputPort("goal").FixValue(context, p_WG)
+
+    def set_torso(self, context: Context, torso_m: float) -> None:
+        """Puts the torso that carries the arm at a height, metres, in a context of the diagram."""
+        if self.torso_frame:
+            raise_torso(self.scene, context, self.torso_frame, torso_m)
+        for system in (self.sensor, self.controller):
+            system.arm.raise_to(system.GetMyMutableContextFromRoot(context), torso_m)
 
 
 def make_reach_diagram(
@@ -73,9 +84,8 @@ def make_reach_diagram(
     plant = scene.plant
     plant.set_name("plant")
 
-    sensor = builder.AddNamedSystem(
-        "sensor", TactileSensor(arm, layout, scene.skin_links, scene.body)
-    )
+    sensor = TactileSensor(arm, layout, scene.skin_links, scene.body)
+    builder.AddNamedSystem("sensor", sensor)
     builder.Connect(plant.get_contact_results_output_port(), sensor.GetInputPort("contact_results"))
     builder.Connect(plant.get_state_output_port(scene.arm), sensor.GetInputPort("arm_state"))
 
@@ -123,6 +133,8 @@ def make_reach_diagram(
     return ReachDiagram(
         diagram=diagram,
         scene=scene,
+        sensor=sensor,
         controller=controller,
+        torso_frame=arm.torso_frame,
         visualizer=visualizer,
     )

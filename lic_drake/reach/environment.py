@@ -11,6 +11,7 @@ from lic_drake.reach.diagram import make_reach_diagram
 from lic_drake.reach.request import is_within_reach
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.simulation import Simulation
+from lic_drake.reach.simulation_pool import SimulationPool
 from lic_drake.reach.stem_waking import StemWakingSimulation
 from lic_drake.reach.stop_rules import StopMonitor
 from lic_drake.reach.trace import ReachResult, ReachTrace
@@ -31,6 +32,7 @@ class Environment:
             times as much and ends the same.
         p_WR: Where the mobile base stands, shape (3,), metres; by default at the origin.
         torso_m: Height of the robot's torso, metres; by default as the scenario's task has it.
+        pool: Simulations that may be used; by default its own.
 
     A base that reaches stands still, so the arm is always welded to the origin of the simulated
     world and the environment is moved into the robot's frame R instead (T_b0 of paper Eq. 3).
@@ -43,6 +45,7 @@ class Environment:
         sleep: bool = True,
         p_WR: Vector | None = None,
         torso_m: float | None = None,
+        pool: SimulationPool | None = None,
     ) -> None:
         self.scenario = scenario
         self.instance = instance
@@ -55,7 +58,7 @@ class Environment:
         if sleep and instance.stems is not None:
             self._waking = StemWakingSimulation(scenario, self._in_R, torso_m)
         elif sleep and can_sleep(instance):
-            self._waking = WakingSimulation(scenario, self._in_R, torso_m)
+            self._waking = WakingSimulation(scenario, self._in_R, torso_m, pool)
 
     def reach(self, p_WG: Vector, x0: Vector, keep_states: bool = False) -> ReachResult:
         """Simulates a reach.

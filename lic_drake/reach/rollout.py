@@ -13,6 +13,7 @@ import lic_drake
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.reach.environment import Environment
 from lic_drake.reach.request import IN_SPACE, ReachRecord, ReachRequest
+from lic_drake.reach.simulation_pool import SimulationPool
 from lic_drake.reach.trace import ReachResult
 
 Vector = NDArray[np.float64]
@@ -23,6 +24,7 @@ MAX_ENVIRONMENTS = 8
 MAX_ENDS = 10_000
 """Reaches of which a process remembers where they left the objects."""
 
+_pool = SimulationPool()
 _environments: dict[tuple[object, ...], Environment] = {}
 _ends: dict[str, Vector] = {}
 
@@ -46,6 +48,7 @@ def environment_of(request: ReachRequest, sleep: bool = True) -> Environment:
             sleep,
             p_WR=request.p_WR,
             torso_m=request.torso,
+            pool=_pool,
         )
     return _environments[key]
 

@@ -4,9 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
+from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.reach.diagram import ReachDiagram
 from lic_drake.reach.trace import SceneState
 from lic_drake.scene.collision import is_touching
+from lic_drake.scene.furnish import furnish
 from lic_drake.scene.scene import SceneConfig
 
 Vector = NDArray[np.float64]
@@ -29,6 +31,8 @@ class Simulation:
         scene = reach_diagram.scene
         self._plant, self._arm, self._clutter = scene.plant, scene.arm, scene.clutter
         self._base = scene.base
+        self._instance: ClutterInstance | None = None
+        self._torso_m: float | None = None
         self._context = reach_diagram.diagram.CreateDefaultContext()
         self._plant_context = scene.plant.GetMyMutableContextFromRoot(self._context)
         self._num_axes = scene.num_axes
@@ -36,6 +40,18 @@ class Simulation:
             -1, self._num_axes
         )
         self._taxel_force = reach_diagram.diagram.GetOutputPort("taxel_force")
+
+    def furnish(self, instance: ClutterInstance, torso_m: float) -> None:
+        """Puts the fixed objects of another environment in the place of those that are there.
+
+        Args:
+            instance: As many fixed objects, and the same movable ones.
+            torso_m: Height of the torso, metres.
+        """
+        if instance is not self._instance or torso_m != self._torso_m:
+            furnish(self._reach_diagram.scene, self._context, instance)
+            self._reach_diagram.set_torso(self._context, torso_m)
+            self._instance, self._torso_m = instance, torso_m
 
     @property
     def num_movable(self) -> int:

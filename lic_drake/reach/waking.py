@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lic_drake.clutter.instance import ClutterInstance
-from lic_drake.reach.diagram import make_reach_diagram
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.simulation import Simulation
+from lic_drake.reach.simulation_pool import SimulationPool
 from lic_drake.reach.trace import SceneState
 from lic_drake.scene.sleep import SkinAxes, SleepMonitor, put_to_sleep
 
@@ -85,14 +85,19 @@ class WakingSimulation(PartlyAsleep):
     """
 
     def __init__(
-        self, scenario: Scenario, instance: ClutterInstance, torso_m: float | None = None
+        self,
+        scenario: Scenario,
+        instance: ClutterInstance,
+        torso_m: float | None = None,
+        pool: SimulationPool | None = None,
     ) -> None:
         self._scenario = scenario
+        self._pool = SimulationPool() if pool is None else pool
         self._instance = instance
         self._torso_m = torso_m
         self._axes = SkinAxes(scenario.arm(torso_m), instance.num_axes)
         self._num_movable = int(np.count_nonzero(instance.movable))
-        self._by_spares: dict[int, Simulation] = {}
+        self._asleep: dict[int, ClutterInstance] = {}
 
     def begin(self, q: Vector, p_WG: Vector, time_s: float = 0.0) -> None:
         """Puts the arm at rest at q and every object where the environment has it."""
@@ -132,11 +137,9 @@ class WakingSimulation(PartlyAsleep):
         self._now.set_state(SceneState(q=state.q, v=state.v, p_WO=p_WO, v_WO=v_WO))
 
     def _with_spares(self, spares: int) -> Simulation:
-        if spares not in self._by_spares:
-            asleep = put_to_sleep(self._instance, spares)
-            diagram = make_reach_diagram(self._scenario, asleep, torso_m=self._torso_m)
-            self._by_spares[spares] = Simulation(diagram, self._scenario.scene)
-        return self._by_spares[spares]
+        if spares not in self._asleep:
+            self._asleep[spares] = put_to_sleep(self._instance, spares)
+        return self._pool.get(self._scenario, self._asleep[spares], self._torso_m)
 
     def _enough_spares(self, awake: int) -> int:
         spares = FEWEST_SPARES

@@ -45,6 +45,8 @@ class Arm(Protocol):
         p_RS: The point about which the whole arm turns, shape (3,), metres.
         reach_m: Largest distance of the tip from it, metres.
         torso_m: Height of the torso that carries it, metres; 0 without one.
+        torso_frame: Name of the plant's frame whose position along its parent's z is that height;
+            empty without a torso.
         skin: The surface of the arm, as capsules or by capsules around it.
     """
 
@@ -56,6 +58,7 @@ class Arm(Protocol):
     p_RS: Vector
     reach_m: float
     torso_m: float
+    torso_frame: str
     skin: tuple[SkinCapsule, ...]
 
     @property

@@ -45,6 +45,8 @@ class PlanarArm:
     link_names: tuple[str, ...] = LINK_NAMES
     surface: tuple[SkinShape, ...] | None = None
 
+    torso_frame = ""
+
     def __init__(self, description: str | None = None, name: str = "planar-arm") -> None:
         """Reads an arm.
 

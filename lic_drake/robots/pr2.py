@@ -64,6 +64,7 @@ class Pr2Arm:
     """
 
     name = "pr2"
+    torso_frame = TORSO_JOINT
     link_names: tuple[str, ...] = link_names()
 
     def __init__(

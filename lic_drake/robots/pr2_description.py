@@ -9,7 +9,12 @@ from pydrake.geometry import Box, Cylinder, SceneGraph
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import ModelInstanceIndex, PrismaticJoint, RevoluteJoint
+from pydrake.multibody.tree import (
+    FixedOffsetFrame,
+    ModelInstanceIndex,
+    PrismaticJoint,
+    RevoluteJoint,
+)
 
 from lic_drake.paths import models_dir
 from lic_drake.robots.pr2_kinematics import ArmLengths, Vector
@@ -104,6 +109,9 @@ def weld_joints(
 ) -> None:
     """Replaces joints by welds, before the plant is finalized.
 
+    A frame with a joint's name is where the joint was, at its position. The pose of that frame in
+    its parent can still be set in a context.
+
     `Joint.Lock` would do neither with an integrator's continuous plant nor save any time.
 
     Args:
@@ -122,7 +130,7 @@ def weld_joints(
             X_PC = X_PC @ turn @ X_PC.inverse()
         parent, child = joint.frame_on_parent(), joint.frame_on_child()
         plant.RemoveJoint(joint)
-        plant.WeldFrames(parent, child, X_PC)
+        plant.WeldFrames(plant.AddFrame(FixedOffsetFrame(name, parent, X_PC, pr2)), child)
 
 
 @cache

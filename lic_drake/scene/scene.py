@@ -148,14 +148,14 @@ def add_scene(
     skin_links = _wear_skin(plant, scene_graph, arm, arm_instance, config.contact)
     clutter = plant.AddModelInstance("clutter")
     objects: list[GeometryId] = []
+    surroundings = _add_surroundings(plant)
     for i in range(instance.num_objects):
-        X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, instance.yaw[i]), instance.p_WO[i])
         name = f"object{i}"
         if instance.movable[i]:
             body = _add_movable(plant, clutter, name, instance, i, config)
             X_BO = RigidTransform(RollPitchYaw(0.0, 0.0, instance.yaw[i]), np.zeros(3))
         else:
-            body, X_BO = plant.world_body(), X_WO
+            body, X_BO = surroundings, pose_of(instance, i)
         shape = make_shape(instance.shape[i], instance.size[i])
         if visuals:
             color = object_color(instance, i)
@@ -240,6 +240,21 @@ def _add_base(plant: MultibodyPlant, base: ModelInstanceIndex) -> Frame:
     return frame
 
 
+def _add_surroundings(plant: MultibodyPlant) -> RigidBody:
+    """Adds a body for what is fixed.
+
+    Not the world's: Drake 1.58 finds no contacts with geometry of the world that `furnish` has put
+    elsewhere, since it is still looked for where it was.
+    """
+    body = plant.AddRigidBody(
+        "surroundings",
+        plant.AddModelInstance("surroundings"),
+        SpatialInertia(1.0, np.zeros(3), UnitInertia.SolidSphere(1.0)),
+    )
+    plant.WeldFrames(plant.world_frame(), body.body_frame())
+    return body
+
+
 def _add_movable(
     plant: MultibodyPlant,
     clutter: ModelInstanceIndex,
@@ -255,6 +270,11 @@ def _add_movable(
     return add_sliding_body(
         plant, clutter, name, mass, p_WO, config.ground_friction_N, config.ground_creep_m_per_s
     )
+
+
+def pose_of(instance: ClutterInstance, i: int) -> RigidTransform:
+    """Returns X_WO of an object."""
+    return RigidTransform(RollPitchYaw(0.0, 0.0, instance.yaw[i]), instance.p_WO[i])
 
 
 def make_shape(shape: str, size: NDArray[np.float64]) -> Shape:

@@ -85,7 +85,7 @@ def test_it_shows_every_object(recorded: tuple[list[ReachTrace], str]) -> None:
         if b"set_object" in message
     }
     assert any(path.startswith("/drake/visualizer/clutter/object0") for path in paths)
-    assert any(path.startswith("/drake/visualizer/object1") for path in paths)
+    assert any(path.endswith("surroundings/object1_visual") for path in paths)
     assert {"/task/goal", "/task/start_line"} <= paths
 
 

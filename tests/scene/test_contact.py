@@ -39,7 +39,7 @@ def test_every_geometry_of_the_arm_is_compliant_and_every_object_is_rigid() -> N
     geometries = scene.plant.GetCollisionGeometriesForBody
     bodies = [scene.plant.get_body(i) for i in scene.plant.GetBodyIndices(scene.clutter)]
     objects = [
-        *geometries(scene.plant.world_body()),
+        *geometries(scene.plant.GetBodyByName("surroundings")),
         *(geometry for body in bodies for geometry in geometries(body)),
     ]
     assert len(objects) == 3
