@@ -11,19 +11,24 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
 from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.reach.approach import WAITING_DEG, plan_approach
 from lic_drake.reach.pointing_starts import mobile_positions
 from lic_drake.reach.recording import MeshcatRecording
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.robots.pr2 import Pr2Arm
 from lic_drake.robots.pr2_meshes import LinkMesh
+from lic_drake.scene.collision import CollisionChecker
 from lic_drake.scene.meshes import wear_meshes
 from lic_drake.scene.scene import add_scene
 
 Vector = NDArray[np.float64]
 
 MOVE_S = 1.0
-"""How long base, torso and arm each take to their places in the recording, seconds."""
+"""So long base, torso and arm each take to their places in the recording, at least, seconds."""
+
+ARM_RAD_PER_S = 1.2
+"""Average speed of the arm's fastest joint on its way."""
 
 _FORCES = "/drake/contact_forces"
 
@@ -34,8 +39,9 @@ RETRACT_SPEED = 4.0
 class MobileRecording(MeshcatRecording):
     """A Meshcat scene of one environment in which a whole PR2 is recorded.
 
-    Moves between reaches are drawn, not simulated: the arm goes back the way it came, nothing else
-    moves, and it does not look where it goes.
+    Moves between reaches are drawn, not simulated, and nothing but the robot moves. The arm goes
+    back the way it came, waits while base and torso move, and passes the board on a path without
+    collisions; where the planner finds none, it takes the straight line.
 
     Args:
         scenario: Robot, task and control rate.
@@ -72,8 +78,8 @@ class MobileRecording(MeshcatRecording):
         self._context = self._diagram.CreateDefaultContext()
         self._plant_context = plant.GetMyMutableContextFromRoot(self._context)
         self._b0 = np.array([0.0, 0.0, scenario.task.torso_m])
-        self._q = arm.q_home
-        self._home = arm.q_home
+        self._q = self._waiting = np.deg2rad(WAITING_DEG)
+        self._checker = CollisionChecker(arm, instance, scenario.scene)
         self._springs_back = instance.stems is not None
         self._draw(self._b0, self._q)
 
@@ -85,8 +91,9 @@ class MobileRecording(MeshcatRecording):
             q: Joint angles, shape (7,), radians.
         """
         base = np.array([*b0[:2], self._b0[2]])
-        for goal_b0, goal_q in ((base, self._q), (b0, self._q), (b0, q)):
-            self._blend(goal_b0, goal_q)
+        for place in (base, b0):
+            self._follow(place, self._q[None])
+        self._follow(b0, self._approach(b0, q))
 
     def add_reach(self, trace: ReachTrace, p_WG: Vector, b0: Vector) -> None:
         """Records a reach.
@@ -108,7 +115,7 @@ class MobileRecording(MeshcatRecording):
         self._clock_s = math.ceil(self._clock_s + 1.0)
 
     def retract(self, trace: ReachTrace) -> None:
-        """Records the arm going back the way it came, and to a posture between reaches.
+        """Records the arm going back the way it came, and to its waiting posture.
 
         Stems go back with it, as they do when nothing holds them any more.
         """
@@ -121,20 +128,31 @@ class MobileRecording(MeshcatRecording):
                 )
             self._draw(self._b0, state.q)
             self._clock_s += 1.0 / self._frames_per_second
-        self._blend(self._b0, self._home)
+        self._follow(self._b0, self._approach(self._b0, self._q)[::-1])
 
     def _show_forces(self, shown: bool) -> None:
         """Shows contact forces from now on, or not: between reaches nothing is simulated."""
         self._meshcat.SetProperty(_FORCES, "visible", shown, self._clock_s)
 
-    def _blend(self, b0: Vector, q: Vector) -> None:
-        """Records a move on a straight line, slow at its ends; none if it is there already."""
-        old_b0, old_q = self._b0, self._q
-        if np.allclose(b0, old_b0) and np.allclose(q, old_q):
+    def _approach(self, b0: Vector, q: Vector) -> Vector:
+        """Returns a path of the arm from its waiting posture to a start, shape (k, 7), radians."""
+        path = plan_approach(self._checker, b0, q)
+        return np.array([self._waiting, q]) if path is None else path
+
+    def _follow(self, b0: Vector, path: Vector) -> None:
+        """Records a move of base and torso to b0 and of the arm along a path; none if it is there.
+
+        Each is slow at its ends, and takes at least `MOVE_S`.
+        """
+        old_b0 = self._b0
+        ways = np.vstack([self._q, path])
+        passed = np.append(0.0, np.cumsum(np.abs(np.diff(ways, axis=0)).max(axis=1)))
+        if np.allclose(b0, old_b0) and passed[-1] < 1e-6:
             return
-        frames = round(MOVE_S * self._frames_per_second)
+        frames = round(max(MOVE_S, passed[-1] / ARM_RAD_PER_S) * self._frames_per_second)
         for share in 0.5 - 0.5 * np.cos(np.pi * np.arange(1, frames + 1) / frames):
-            self._draw(old_b0 + share * (b0 - old_b0), old_q + share * (q - old_q))
+            q = [np.interp(share * passed[-1], passed, angle) for angle in ways.T]
+            self._draw(old_b0 + share * (b0 - old_b0), np.array(q))
             self._clock_s += 1.0 / self._frames_per_second
 
     def _draw(self, b0: Vector, q: Vector) -> None:
