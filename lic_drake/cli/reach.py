@@ -20,7 +20,8 @@ def add_parser(subparsers: Subparsers) -> None:
         help="simulate one reach and print its record",
         description="Simulates one reach from a start pose to a goal in a random environment and"
         " prints its record. The exit code is 0 whether or not the goal was reached.",
-        epilog="example: lic reach --goal 0.6 0.1 --start-y 0.0 --start-phi 60 --environment 3",
+        epilog="examples: lic reach --goal 0.6 0.1 --start-y 0.0 --start-phi 60 --environment 3;"
+        " lic reach --scenario sphere-aperture-clutter --base-y 0.1 --torso 0.2",
     )
     add_scenario_arguments(parser)
     parser.add_argument(
@@ -36,24 +37,39 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--goal",
         type=float,
-        nargs=2,
-        metavar=("X", "Y"),
-        help="goal in metres, x into the clutter, y to the left (default: the one that the"
-        " environment offers, else 0.6 0)",
+        nargs="+",
+        metavar="METRES",
+        help="goal, X Y or for the PR2 X Y Z, in metres, x into the clutter, y to the left"
+        " (default: the one that the environment offers, else 0.6 0)",
     )
     parser.add_argument(
         "--start-y",
         type=float,
-        default=0.0,
         metavar="Y",
-        help="start position on the start line, metres (default: 0)",
+        help="planar arm: start position on the start line, metres (default: 0)",
     )
     parser.add_argument(
         "--start-phi",
         type=float,
-        default=60.0,
         metavar="DEG",
-        help="start orientation of the hand, degrees from straight ahead (default: 60)",
+        help="planar arm: start orientation of the hand, degrees from straight ahead (default: 60)",
+    )
+    parser.add_argument(
+        "--aperture",
+        type=float,
+        nargs=2,
+        metavar=("Y", "Z"),
+        help="PR2: the aperture to reach through, by its place in the board, metres (default: the"
+        " open one nearest to the goal)",
+    )
+    parser.add_argument(
+        "--base-y", type=float, metavar="Y", help="PR2: place of the base, metres (default: 0)"
+    )
+    parser.add_argument(
+        "--torso",
+        type=float,
+        metavar="Z",
+        help="PR2: height of the torso, metres (default: the scenario's)",
     )
     parser.add_argument(
         "--json",
@@ -77,25 +93,12 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Runs the subcommand and returns the exit code."""
-    import numpy as np
-
+    from lic_drake.cli.asked_reach import asked_reach
     from lic_drake.errors import RequestError
-    from lic_drake.reach.request import check_goal, make_request
     from lic_drake.reach.rollout import run_reach
     from lic_drake.reach.scenario import load_scenario
 
-    scenario = load_scenario(args.scenario, args.set)
-    if args.goal is None and scenario.task.goal_area is None:
-        p_WG = scenario.sample_goal(args.stream, args.environment)
-    else:
-        p_WG = np.array([*(args.goal or (0.6, 0.0)), 0.0])
-    check_goal(scenario, p_WG)
-    x0 = np.array([scenario.task.start_line.x_m, args.start_y, np.deg2rad(args.start_phi)])
-    if not np.all(np.isfinite(x0)):
-        raise RequestError(
-            f"a start is two finite numbers, got y {args.start_y} m, phi {args.start_phi} degrees"
-        )
-    request = make_request(scenario, args.stream, args.environment, p_WG, x0)
+    request = asked_reach(load_scenario(args.scenario, args.set), args)
     for path in (args.diagram, args.record):
         if path is not None:
             _check_writable(path)
@@ -104,8 +107,8 @@ def run(args: argparse.Namespace) -> int:
     record = run_reach(request)
     if record.outcome == "invalid_start":
         raise RequestError(
-            f"cannot start at y {args.start_y:g} m, phi {args.start_phi:g} degrees:"
-            f" {record.detail}; `lic select` lists starts that are possible"
+            f"cannot start at {_describe_start(request)}: {record.detail}; `lic select` names a"
+            " start that is possible"
         )
     if args.record is not None:
         _record(request, args.record)
@@ -148,6 +151,12 @@ def _record(request: "ReachRequest", path: Path) -> None:
     recording = ReachRecording(request.scenario, instance_of(request), request.torso)
     recording.add_reach(simulate_request(request, keep_states=True).trace, np.array(request.goal))
     recording.save(path)
+
+
+def _describe_start(request: "ReachRequest") -> str:
+    if len(request.start) == 3:
+        return f"y {request.start[1]:g} m, phi {math.degrees(request.start[2]):g} degrees"
+    return "the aperture at y {:g} m, z {:g} m".format(*request.start[1:3])
 
 
 def _describe(record: "ReachRecord") -> str:

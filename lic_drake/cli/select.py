@@ -136,19 +136,11 @@ def _failed_start(scenario: "Scenario", starts: "Starts", y: float, other: float
     """
     import numpy as np
 
-    from lic_drake.errors import RequestError
     from lic_drake.reach.pointing_starts import PointingStarts
     from lic_drake.select.situation import FailedReach
 
     if not isinstance(starts, PointingStarts):
         x0 = np.array([scenario.task.start_line.x_m, y, np.deg2rad(other)])
         return FailedReach.from_start(x0)
-    distance = np.linalg.norm(starts.p_WA[:, 1:] - [y, other], axis=1)
-    p_WA = starts.p_WA[np.argmin(distance)]
-    if distance.min() > 0.5 * starts.aperture_m:
-        raise RequestError(
-            f"there is no open aperture at y {y} m, z {other} m; the nearest is at y {p_WA[1]:.3f}"
-            f" m, z {p_WA[2]:.3f} m"
-        )
-    x0 = np.array([*p_WA, 1.0, 0.0, 0.0, 0.0])
+    x0 = np.array([*starts.nearest_aperture(y, other), 1.0, 0.0, 0.0, 0.0])
     return FailedReach.from_start(x0, torso_m=scenario.task.torso_m)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lic_drake.clutter.board import ApertureBoard
 from lic_drake.clutter.instance import ClutterInstance
-from lic_drake.errors import ScenarioError
+from lic_drake.errors import RequestError, ScenarioError
 from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.task import Stand
@@ -59,6 +59,21 @@ class PointingStarts:
             return np.ones(len(x0))
         apart = np.linalg.norm(x0[:, None, :3] - self.p_WA, axis=2)
         return self.probability_open[np.argmin(apart, axis=1)]
+
+    def nearest_aperture(self, y_m: float, z_m: float) -> Vector:
+        """Returns the centre of the open aperture at a place in the board, shape (3,), metres.
+
+        Raises:
+            RequestError: There is none.
+        """
+        distance = np.linalg.norm(self.p_WA[:, 1:] - [y_m, z_m], axis=1)
+        p_WA: Vector = self.p_WA[np.argmin(distance)]
+        if not distance.min() <= 0.5 * self.aperture_m:
+            raise RequestError(
+                f"there is no open aperture at y {y_m} m, z {z_m} m; the nearest is at y"
+                f" {p_WA[1]:.3f} m, z {p_WA[2]:.3f} m"
+            )
+        return p_WA
 
     @property
     def all_apertures(self) -> Vector:

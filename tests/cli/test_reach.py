@@ -101,6 +101,7 @@ def test_a_recording_leaves_the_output_to_the_command(tmp_path: Path) -> None:
         (["--goal", "5", "0"], "the goal (5, 0) m is 5.000 m from the base and the arm reaches"),
         (["--goal", "nan", "0"], "a goal is two finite numbers in metres, got [nan, 0.0, 0.0]"),
         (["--goal", "0.6", "inf"], "a goal is two finite numbers in metres, got [0.6, inf, 0.0]"),
+        (["--goal", "0.6"], "a goal of cylinder-clutter is 2 numbers in metres, got 1: --goal 0.6"),
         (["--start-y", "nan"], "a start is two finite numbers, got y nan m, phi 60.0 degrees"),
         (["--start-phi", "inf"], "a start is two finite numbers, got y 0.0 m, phi inf degrees"),
         (["--start-phi", "-90"], "cannot start at y 0 m, phi -90 degrees: no configuration within"),
@@ -139,9 +140,7 @@ def test_a_start_in_the_clutter_is_a_mistake(capsys: pytest.CaptureFixture[str])
     assert "the arm touches the clutter at its start" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    "arguments", [["--goal", "0.6"], ["--goal", "a", "b"], ["--environment", "1.5"], ["--set"]]
-)
+@pytest.mark.parametrize("arguments", [["--goal", "a", "b"], ["--environment", "1.5"], ["--set"]])
 def test_what_argparse_refuses_has_exit_code_2(
     capsys: pytest.CaptureFixture[str], arguments: list[str]
 ) -> None:
@@ -160,3 +159,45 @@ def test_a_reach_that_fails_in_the_simulator_is_reported_not_raised(
     monkeypatch.setattr("lic_drake.reach.rollout.run_reach", diverge)
     assert main(LIC_REACH) == 0
     assert capsys.readouterr().out.startswith("diverged after 0.40 s")
+
+
+PR2 = ["reach", "--scenario", "sphere-aperture-clutter", "--set", "{stop: {timeout_s: 0.4}}"]
+
+
+def test_a_pr2_reaches_through_the_aperture_that_is_named(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    place = ["--aperture", "-0.3", "1.0", "--base-y", "0.1", "--torso", "0.2"]
+    assert main([*PR2, "--json", "--goal", "0.84", "-0.2", "0.95", *place]) == 0
+    values = json.loads(capsys.readouterr().out)
+    assert (values["goal_z"], values["base_y"], values["torso"]) == (0.95, 0.1, 0.2)
+    assert values["start_y"] == pytest.approx(-0.29) and values["start_z"] == pytest.approx(0.99)
+    assert values["duration_s"] == 0.4 and len(values["q_final"]) == 7
+
+
+def test_a_pr2_has_defaults_too(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*PR2, "--json"]) == 0
+    values = json.loads(capsys.readouterr().out)
+    goal = load_scenario("sphere-aperture-clutter").sample_goal("evaluation", 0)
+    assert [values[f"goal_{axis}"] for axis in "xyz"] == goal.tolist()
+    assert abs(values["start_y"] - goal[1]) <= 0.1 and abs(values["start_z"] - goal[2]) <= 0.1
+    assert (values["base_y"], values["torso"]) == (0.0, 0.15)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--base-y", "0.5"], "--base-y must be from -0.3 to 0.3 m, got 0.5"),
+        (["--torso", "nan"], "--torso must be from 0.0115 to 0.305 m, got nan"),
+        (["--goal", "0.8", "0.0"], "is 3 numbers in metres, got 2: --goal 0.8 0.0"),
+        (["--aperture", "3", "0"], "there is no open aperture at y 3.0 m"),
+        (["--start-phi", "3"], "--start-phi is not for the robot of sphere-aperture-clutter, pr2"),
+        (["--goal", "3", "0", "1"], "choose a nearer goal"),
+    ],
+)
+def test_what_a_pr2_cannot_do_is_one_line(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*PR2, *arguments]) != 0
+    error = capsys.readouterr().err
+    assert message in error and error.count("\n") == 1

@@ -1,0 +1,88 @@
+"""The reach that a command line asks for: in the plane, or of a PR2 through an aperture."""
+
+import argparse
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.errors import RequestError
+from lic_drake.reach.pointing_starts import PointingStarts, pointing_starts
+from lic_drake.reach.request import ReachRequest, check_goal, make_request
+from lic_drake.reach.scenario import Scenario
+
+Vector = NDArray[np.float64]
+
+
+def asked_reach(scenario: Scenario, args: argparse.Namespace) -> ReachRequest:
+    """Returns the request of the arguments of `lic reach`.
+
+    Raises:
+        RequestError: Goal or start are not possible, or are those of another kind of robot.
+    """
+    instance = scenario.sample_instance(args.stream, args.environment)
+    in_space = scenario.arm().surface is not None
+    p_WG = _goal(scenario, in_space, args)
+    foreign = ("start_y", "start_phi") if in_space else ("aperture", "base_y", "torso")
+    for name in foreign:
+        if getattr(args, name) is not None:
+            option = "--" + name.replace("_", "-")
+            raise RequestError(
+                f"{option} is not for the robot of {scenario.category}, {scenario.robot}; see"
+                " `lic reach --help`"
+            )
+    if in_space:
+        return _through_an_aperture(scenario, instance, p_WG, args)
+    y_m = 0.0 if args.start_y is None else args.start_y
+    phi_deg = 60.0 if args.start_phi is None else args.start_phi
+    x0 = np.array([scenario.task.start_line.x_m, y_m, np.deg2rad(phi_deg)])
+    if not np.all(np.isfinite(x0)):
+        raise RequestError(f"a start is two finite numbers, got y {y_m} m, phi {phi_deg} degrees")
+    check_goal(scenario, p_WG)
+    return make_request(scenario, args.stream, args.environment, p_WG, x0)
+
+
+def _goal(scenario: Scenario, in_space: bool, args: argparse.Namespace) -> Vector:
+    if args.goal is None:
+        if scenario.task.goal_area is None or in_space:
+            return scenario.sample_goal(args.stream, args.environment)
+        return np.array([0.6, 0.0, 0.0])
+    size = 3 if in_space else 2
+    if len(args.goal) != size:
+        raise RequestError(
+            f"a goal of {scenario.category} is {size} numbers in metres, got {len(args.goal)}:"
+            f" --goal {' '.join(map(str, args.goal))}"
+        )
+    return np.array([*args.goal, 0.0][:3])
+
+
+def _through_an_aperture(
+    scenario: Scenario, instance: ClutterInstance, p_WG: Vector, args: argparse.Namespace
+) -> ReachRequest:
+    starts = pointing_starts(scenario, instance, scenario.task.stand)
+    y_m = 0.0 if args.base_y is None else args.base_y
+    torso_m = scenario.task.torso_m if args.torso is None else args.torso
+    _check_stand(starts, y_m, torso_m)
+    check_goal(scenario, p_WG - [0.0, y_m, 0.0], torso_m)
+    if args.aperture is None:
+        p_WA = starts.p_WA[np.argmin(np.linalg.norm(starts.p_WA[:, 1:] - p_WG[1:], axis=1))]
+    else:
+        p_WA = starts.nearest_aperture(*args.aperture)
+    found = starts.pre_select(p_WA, np.array([0.0, y_m, torso_m]))
+    if found is None:
+        raise RequestError(
+            f"from base y {y_m:g} m, torso {torso_m:g} m the arm cannot be in the aperture at y"
+            f" {p_WA[1]:.3f} m, z {p_WA[2]:.3f} m; choose another --base-y, --torso or --aperture"
+        )
+    p_WR = np.array([0.0, y_m])
+    return make_request(scenario, args.stream, args.environment, p_WG, found[0], p_WR, torso_m)
+
+
+def _check_stand(starts: PointingStarts, y_m: float, torso_m: float) -> None:
+    stand = starts.stand
+    for option, value, low, high in (
+        ("--base-y", y_m, stand.y_min_m, stand.y_max_m),
+        ("--torso", torso_m, stand.torso_min_m, stand.torso_max_m),
+    ):
+        if not low <= value <= high:
+            raise RequestError(f"{option} must be from {low:g} to {high:g} m, got {value:g}")
