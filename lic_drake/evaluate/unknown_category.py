@@ -12,14 +12,13 @@ from lic_drake.evaluate.statistics import Count, count, mcnemar
 from lic_drake.evaluate.table import Table
 from lic_drake.evaluate.trial import Attempt, run_trial
 from lic_drake.evaluate.trials import TrialRow, TrialTable, write_trials
-from lic_drake.experience.schema import scenario_text
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.rollout import run_reach
-from lic_drake.reach.scenario import Scenario, parse_scenario
+from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.starts import make_starts
-from lic_drake.robots.planar import PlanarArm
 from lic_drake.select.mixture import Category, MixtureLic
+from lic_drake.select.mixture_maker import check_comparable, with_common_starts
 from lic_drake.select.planar_lic import PlanarLic
 from lic_drake.select.registry import Selector, make_selector
 from lic_drake.select.situation import FailedReach, Situation
@@ -35,10 +34,6 @@ NAMES = {
     "wrong": "the other category is taken for certain",
 }
 """Strategies and what tables call them."""
-
-COMMON_STARTS = "{task: {start_line: {phi_step_deg: 15.0}}}"
-"""Put over the scenarios of the plane, whose grids of starts are 30 and 45 degrees apart on the
-same line: this one holds both, and optimisations begin from the same candidates in all of them."""
 
 SAVE_EVERY = 20
 """Trials between two writings of the reaches."""
@@ -60,8 +55,7 @@ class Comparison:
 
     def scenario(self, category: str) -> Scenario:
         """Returns the scenario that is tried, with the common starts."""
-        text = scenario_text(self.libraries[category].scenario())
-        return parse_scenario(text, COMMON_STARTS, source="the common starts")
+        return with_common_starts(self.libraries[category])
 
 
 def make_strategies(comparison: Comparison, estimator: str) -> dict[str, dict[str, Selector]]:
@@ -73,15 +67,7 @@ def make_strategies(comparison: Comparison, estimator: str) -> dict[str, dict[st
     scenarios = {name: comparison.scenario(name) for name in comparison.libraries}
     if len(scenarios) != 2:
         raise RequestError(f"two categories are compared, got {', '.join(scenarios)}")
-    one, other = scenarios.values()
-    arm = one.arm()
-    if (one.robot, one.task.start_line) != (other.robot, other.task.start_line) or not isinstance(
-        arm, PlanarArm
-    ):
-        raise RequestError(
-            f"{' and '.join(scenarios)} have other arms or start lines; compare categories of the"
-            " planar arm with the same task.start_line"
-        )
+    arm = check_comparable(scenarios)
     known: dict[str, PlanarLic] = {}
     final: dict[str, FinalPositions] = {}
     for name, library in comparison.libraries.items():

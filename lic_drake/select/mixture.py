@@ -37,6 +37,21 @@ def posterior(prior: Vector, log_likelihood: Vector) -> Vector:
     return normalised
 
 
+def check_distribution(probability: Mapping[str, float]) -> Vector:
+    """Returns the probabilities of categories, shape (k,).
+
+    Raises:
+        RequestError: There is none, one is negative, or they do not add up to 1.
+    """
+    prior = np.array(list(probability.values()))
+    if not len(prior) or np.any(prior < 0.0) or not np.isclose(prior.sum(), 1.0, atol=1e-6):
+        raise RequestError(
+            "the probabilities of the categories must be 0 or more and add up to 1, got"
+            f" {dict(probability)}; divide them by their sum"
+        )
+    return prior
+
+
 @dataclass(frozen=True, kw_only=True)
 class MixtureObjective:
     """The mixture of what categories estimate; satisfies `SuccessObjective`.
@@ -112,12 +127,7 @@ class MixtureLic(PlanarLic):
         Raises:
             RequestError: There is no category, or the probabilities are no distribution.
         """
-        prior = np.array([category.probability for category in categories.values()])
-        if not len(prior) or np.any(prior < 0.0) or not np.isclose(prior.sum(), 1.0, atol=1e-6):
-            raise RequestError(
-                "the probabilities of the categories must be 0 or more and add up to 1, got"
-                f" {dict(zip(categories, prior.tolist(), strict=True))}; divide them by their sum"
-            )
+        prior = check_distribution({name: c.probability for name, c in categories.items()})
         self.categories = dict(categories)
         self.updates = updates
         self._prior = prior
