@@ -18,7 +18,7 @@ from lic_drake.select.situation import Situation
 
 Vector = NDArray[np.float64]
 
-LATTICE_M = 0.02
+LATTICE_M = 0.025
 """Distance of neighbouring places of the base and heights of the torso that are compared before
 solving. From the grid's best places alone the solver's end was below the best of 20,000 samples in
 two of five situations, by up to 5 points: an L1 kernel has kinks, where it stops."""
@@ -62,22 +62,22 @@ class PointingLic(LicSelector):
         values: Vector,
     ) -> Iterator[InitialConditions]:
         starts = _pointing(situation)
-        lattice = _lattice(starts.stand, LATTICE_M)
         places = []
         for p_WA in starts.p_WA:
             here = np.all(np.isclose(candidates.x0[:, :3], p_WA), axis=1)
             if np.any(here):
                 x0 = candidates.x0[np.flatnonzero(here)[np.argmax(values[here])]]
-                places.append((x0, self._values(situation, objective, x0, lattice)))
-        places.sort(key=lambda place: -place[1].max())
+                lattice = _lattice(starts, p_WA, starts.stand, LATTICE_M)
+                places.append((x0, lattice, self._values(situation, objective, x0, lattice)))
+        places.sort(key=lambda place: -place[2].max())
         best = float(values.max())
-        for x0, found in places:
+        for x0, lattice, found in places:
             if found.max() < best - MAX_GAIN:
                 break
             start = _first_possible(starts, x0[:3], lattice, found)
             if start is None:
                 continue
-            fine = _lattice(_around(starts.stand, start[1]), FINE_M)
+            fine = _lattice(starts, x0[:3], _around(starts.stand, start[1]), FINE_M)
             nearby = self._values(situation, objective, x0, fine)
             start = _first_possible(starts, x0[:3], fine, nearby) or start
             for pose, b0 in (start, self._solve(starts, objective, *start)):
@@ -158,15 +158,38 @@ def is_apart(situation: Situation, conditions: InitialConditions) -> NDArray[np.
     return apart
 
 
-def _lattice(stand: Stand, step_m: float) -> Vector:
-    """Returns places of the base and heights of the torso, shape (n, 3), metres."""
-    y = _steps(stand.y_min_m, stand.y_max_m, step_m)
-    torso = _steps(stand.torso_min_m, stand.torso_max_m, step_m)
+def _lattice(starts: PointingStarts, p_WA: Vector, stand: Stand, step_m: float) -> Vector:
+    """Returns places of the base and heights of the torso, shape (n, 3), metres.
+
+    Among them are all from which the robot sees the aperture where it saw one when it learned: an
+    estimate has its peaks there.
+
+    Args:
+        starts: The apertures, and where base and torso are in a collection.
+        p_WA: The aperture's centre, shape (3,), metres.
+        stand: Where base and torso may be.
+        step_m: Largest distance of neighbours, metres.
+    """
+    apart = p_WA - starts.all_apertures
+    learned = starts.stand
+    y = _steps(
+        stand.y_min_m, stand.y_max_m, step_m, np.add.outer(apart[:, 1], learned.training_y_m)
+    )
+    torso = _steps(
+        stand.torso_min_m,
+        stand.torso_max_m,
+        step_m,
+        np.add.outer(apart[:, 2], learned.training_torso_m),
+    )
     return np.array([[0.0, y_m, torso_m] for y_m in y for torso_m in torso])
 
 
-def _steps(low: float, high: float, step: float) -> Vector:
-    return np.linspace(low, high, int(np.ceil((high - low) / step - 1e-9)) + 1)
+def _steps(low: float, high: float, step: float, more: Vector) -> Vector:
+    """Returns numbers from low to high in steps, and those of more that are between them."""
+    row = np.linspace(low, high, int(np.ceil((high - low) / step - 1e-9)) + 1)
+    # To the micrometre, as places are chosen: twins by rounding are one.
+    more = np.round(more.ravel(), 6)
+    return np.unique(np.round(np.append(row, more[(more >= low) & (more <= high)]), 6))
 
 
 def _around(stand: Stand, b0: Vector) -> Stand:
