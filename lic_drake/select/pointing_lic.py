@@ -1,7 +1,6 @@
 """LIC's optimisation for a PR2 before a board of apertures."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +23,14 @@ solving. From the grid's best places alone the solver's end was below the best o
 two of five situations, by up to 5 points: an L1 kernel has kinks, where it stops."""
 
 FINE_M = 0.003
-"""The same around the best place, up to the neighbours in the coarser lattice."""
+"""The distance is halved around the best places until it is at most this."""
+
+RISE_PER_M = 5.0
+"""Between neighbouring places an estimate may be higher than at them by this times their
+distance."""
+
+MAX_REFINED = 150
+"""Around so many of the best places, of all apertures, at most."""
 
 MAX_TRIED = 40
 """So many places at an aperture are tried, the best first, until the arm can be there."""
@@ -62,24 +68,15 @@ class PointingLic(LicSelector):
         values: Vector,
     ) -> Iterator[InitialConditions]:
         starts = _pointing(situation)
-        places = []
-        for p_WA in starts.p_WA:
-            here = np.all(np.isclose(candidates.x0[:, :3], p_WA), axis=1)
-            if np.any(here):
-                x0 = candidates.x0[np.flatnonzero(here)[np.argmax(values[here])]]
-                lattice = _lattice(starts, p_WA, starts.stand, LATTICE_M)
-                places.append((x0, lattice, self._values(situation, objective, x0, lattice)))
-        places.sort(key=lambda place: -place[2].max())
+        places, found = self._search(situation, objective, candidates, values)
         best = float(values.max())
-        for x0, lattice, found in places:
-            if found.max() < best - MAX_GAIN:
+        apertures = [np.all(np.isclose(places.x0[:, :3], p_WA), axis=1) for p_WA in starts.p_WA]
+        for here in sorted(apertures, key=lambda here: -found.max(where=here, initial=-np.inf)):
+            if found.max(where=here, initial=-np.inf) < best - MAX_GAIN:
                 break
-            start = _first_possible(starts, x0[:3], lattice, found)
+            start = _first_possible(starts, places.take(here), found[here])
             if start is None:
                 continue
-            fine = _lattice(starts, x0[:3], _around(starts.stand, start[1]), FINE_M)
-            nearby = self._values(situation, objective, x0, fine)
-            start = _first_possible(starts, x0[:3], fine, nearby) or start
             for pose, b0 in (start, self._solve(starts, objective, *start)):
                 condition = InitialConditions(pose[None], b0[None, :2], b0[2:])
                 possible = starts.angles(pose, b0[:2], b0[2]) is not None
@@ -88,15 +85,41 @@ class PointingLic(LicSelector):
                     value = objective.values(condition) * self._chance(situation, condition)
                     best = max(best, float(value[0]))
 
+    def _search(
+        self,
+        situation: Situation,
+        objective: SuccessObjective,
+        candidates: InitialConditions,
+        values: Vector,
+    ) -> tuple[InitialConditions, Vector]:
+        """Returns places at all apertures, denser where estimates are high, and the estimates.
+
+        An aperture has the tool pose of its best candidate.
+        """
+        starts = _pointing(situation)
+        places = candidates.take(np.zeros(0, dtype=int))
+        for p_WA in starts.p_WA:
+            here = np.all(np.isclose(candidates.x0[:, :3], p_WA), axis=1)
+            if np.any(here):
+                x0 = candidates.x0[np.flatnonzero(here)[np.argmax(values[here])]]
+                places = places.join(_at(x0, _lattice(starts, p_WA)))
+        found = self._values(situation, objective, places)
+        step_m = LATTICE_M
+        while step_m > FINE_M:
+            high = np.argsort(-found, kind="stable")[:MAX_REFINED]
+            high = high[found[high] > found.max() - RISE_PER_M * step_m]
+            step_m /= 2.0
+            nearby = _around(starts.stand, places.take(high), step_m)
+            places = places.join(nearby)
+            found = np.append(found, self._values(situation, objective, nearby))
+        return places, found
+
     def _values(
-        self, situation: Situation, objective: SuccessObjective, x0: Vector, places: Vector
+        self, situation: Situation, objective: SuccessObjective, places: InitialConditions
     ) -> Vector:
-        """Returns the estimates of a tool pose from places, shape (n, 3): shape (n,)."""
-        at = InitialConditions(
-            np.tile(x0, (len(places), 1)), places[:, :2].copy(), places[:, 2].copy()
-        )
-        values = objective.values(at) * self._chance(situation, at)
-        return np.where(is_apart(situation, at), values, -np.inf)
+        """Returns the estimates of n places, -inf for those that are not allowed, shape (n,)."""
+        values = objective.values(places) * self._chance(situation, places)
+        return np.where(is_apart(situation, places), values, -np.inf)
 
     def _solve(
         self, starts: PointingStarts, objective: SuccessObjective, x0: Vector, b0: Vector
@@ -158,63 +181,60 @@ def is_apart(situation: Situation, conditions: InitialConditions) -> NDArray[np.
     return apart
 
 
-def _lattice(starts: PointingStarts, p_WA: Vector, stand: Stand, step_m: float) -> Vector:
+def _at(x0: Vector, places: Vector) -> InitialConditions:
+    """Returns a tool pose, shape (7,), from n places, shape (n, 3), metres."""
+    return InitialConditions(
+        np.tile(x0, (len(places), 1)), places[:, :2].copy(), places[:, 2].copy()
+    )
+
+
+def _lattice(starts: PointingStarts, p_WA: Vector) -> Vector:
     """Returns places of the base and heights of the torso, shape (n, 3), metres.
 
-    Among them are all from which the robot sees the aperture where it saw one when it learned: an
-    estimate has its peaks there.
-
-    Args:
-        starts: The apertures, and where base and torso are in a collection.
-        p_WA: The aperture's centre, shape (3,), metres.
-        stand: Where base and torso may be.
-        step_m: Largest distance of neighbours, metres.
+    Among them are all from which a robot has an aperture, with its centre at p_WA, shape (3,),
+    where it had one when it learned: there an L1 kernel has kinks, and an estimate its peaks.
     """
-    apart = p_WA - starts.all_apertures
-    learned = starts.stand
-    y = _steps(
-        stand.y_min_m, stand.y_max_m, step_m, np.add.outer(apart[:, 1], learned.training_y_m)
-    )
-    torso = _steps(
-        stand.torso_min_m,
-        stand.torso_max_m,
-        step_m,
-        np.add.outer(apart[:, 2], learned.training_torso_m),
-    )
+    stand, apart = starts.stand, p_WA - starts.all_apertures
+    learned_y = np.add.outer(apart[:, 1], stand.training_y_m)
+    learned_torso = np.add.outer(apart[:, 2], stand.training_torso_m)
+    y = _steps(stand.y_min_m, stand.y_max_m, learned_y)
+    torso = _steps(stand.torso_min_m, stand.torso_max_m, learned_torso)
     return np.array([[0.0, y_m, torso_m] for y_m in y for torso_m in torso])
 
 
-def _steps(low: float, high: float, step: float, more: Vector) -> Vector:
+def _steps(low: float, high: float, more: Vector) -> Vector:
     """Returns numbers from low to high in steps, and those of more that are between them."""
-    row = np.linspace(low, high, int(np.ceil((high - low) / step - 1e-9)) + 1)
-    # To the micrometre, as places are chosen: twins by rounding are one.
-    more = np.round(more.ravel(), 6)
-    return np.unique(np.round(np.append(row, more[(more >= low) & (more <= high)]), 6))
+    row = np.linspace(low, high, int(np.ceil((high - low) / LATTICE_M - 1e-9)) + 1)
+    inside = more[(more > low) & (more < high)]
+    # To the micrometre, as places are chosen: equal but for rounding is equal.
+    return np.unique(np.round(np.append(row, inside), 6))
 
 
-def _around(stand: Stand, b0: Vector) -> Stand:
-    """Returns the part of where base and torso may be that is around a place."""
-    _, y_m, torso_m = b0
-    return replace(
-        stand,
-        y_min_m=max(stand.y_min_m, y_m - LATTICE_M),
-        y_max_m=min(stand.y_max_m, y_m + LATTICE_M),
-        torso_min_m=max(stand.torso_min_m, torso_m - LATTICE_M),
-        torso_max_m=min(stand.torso_max_m, torso_m + LATTICE_M),
-        training_y_m=[y_m],
-        training_torso_m=[torso_m],
-    )
+def _around(stand: Stand, places: InitialConditions, step_m: float) -> InitialConditions:
+    """Returns the eight neighbours of each place, a step away along y, torso or both."""
+    offsets = [
+        [dy, dz] for dy in (-step_m, 0.0, step_m) for dz in (-step_m, 0.0, step_m) if dy or dz
+    ]
+    y_torso = np.repeat(places.b0[:, 1:], len(offsets), axis=0)
+    y_torso += np.tile(offsets, (len(places), 1))
+    low = [stand.y_min_m, stand.torso_min_m]
+    high = [stand.y_max_m, stand.torso_max_m]
+    y_torso = np.round(np.clip(y_torso, low, high), 6)
+    x0 = np.repeat(places.x0, len(offsets), axis=0)
+    _, new = np.unique(np.hstack([x0, y_torso]), axis=0, return_index=True)
+    y_m, torso_m = y_torso[new].T
+    return InitialConditions(x0[new], np.column_stack([np.zeros(len(new)), y_m]), torso_m)
 
 
 def _first_possible(
-    starts: PointingStarts, p_WA: Vector, places: Vector, values: Vector
+    starts: PointingStarts, places: InitialConditions, values: Vector
 ) -> tuple[Vector, Vector] | None:
     """Returns tool pose and place, shape (7,) and (3,), of the best place where the arm can be."""
     for i in np.argsort(-values, kind="stable")[:MAX_TRIED]:
         if values[i] == -np.inf:
             break
-        b0 = _inside(starts, places[i])
-        found = starts.pre_select(p_WA, b0)
+        b0 = _inside(starts, places.b0[i])
+        found = starts.pre_select(places.x0[i, :3], b0)
         if found is not None:
             return found[0], b0
     return None
