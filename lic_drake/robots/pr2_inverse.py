@@ -89,12 +89,15 @@ def solve_pointing(
     sin_roll = np.where(is_bent, -heading.p_SW[:, 1], 0.0) / np.where(is_bent, aside, 1.0)
     reaches = (np.abs(cos_elbow) <= 1.0 + _SLACK) & (np.abs(sin_roll) <= 1.0 + _SLACK)
     reaches &= is_bent | (np.abs(heading.p_SW[:, 1]) <= _STRAIGHT)
-    roll = np.arcsin(np.clip(sin_roll, -1.0, 1.0))
+    # What follows is only worked out where the arm is long enough.
+    heading = _Heading(heading.p_SW[reaches], heading.u_S[reaches])
+    pan, elbow, along, aside = (v[reaches] for v in (pan, elbow, along, aside))
+    roll = np.arcsin(np.clip(sin_roll[reaches], -1.0, 1.0))
     branches = [
         _complete(heading, pan, roll, elbow, along, aside),
         _complete(heading, pan, np.pi - roll, elbow, along, aside),
     ]
-    q = np.stack(branches, axis=1)[reaches].reshape(-1, 7)
+    q = np.stack(branches, axis=1).reshape(-1, 7)
     # The roll's range is less than a turn, but does not lie about 0.
     q[:, 2] = kinematics.q_min[2] + np.mod(q[:, 2] - kinematics.q_min[2], 2.0 * np.pi)
     return _keep_limits(kinematics, q)
