@@ -9,28 +9,25 @@ from scipy.optimize import minimize
 from lic_drake.errors import RequestError
 from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.reach.pointing_starts import PointingStarts
-from lic_drake.reach.task import Stand
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.objective import SuccessObjective
+from lic_drake.select.pointing_places import LATTICE_M, find_neighbours, make_lattice
 from lic_drake.select.pointing_program import PointingProgram
 from lic_drake.select.situation import Situation
 
 Vector = NDArray[np.float64]
 
-LATTICE_M = 0.025
-"""Distance of neighbouring places of the base and heights of the torso that are compared before
-solving. From the grid's best places alone the solver's end was below the best of 20,000 samples in
-two of five situations, by up to 5 points: an L1 kernel has kinks, where it stops."""
-
 FINE_M = 0.003
-"""The distance is halved around the best places until it is at most this."""
+"""Around the best places of a lattice the distance of places is halved until it is at most this."""
 
 RISE_PER_M = 5.0
-"""Between neighbouring places an estimate may be higher than at them by this times their
-distance."""
+"""Beside a place an estimate may be higher than there by this times the distance: the second stage
+of LIC-2 has crests where the first one's estimate has a certain value, and an L1 kernel has kinks,
+where a solver stops. From the best place of each aperture alone its end was below the best of
+20,000 samples in every fifth situation, by up to 17 points."""
 
 MAX_REFINED = 150
-"""Around so many of the best places, of all apertures, at most."""
+"""Only around so many places, the best ones of all apertures, others are looked at."""
 
 MAX_TRIED = 40
 """So many places at an aperture are tried, the best first, until the arm can be there."""
@@ -102,14 +99,14 @@ class PointingLic(LicSelector):
             here = np.all(np.isclose(candidates.x0[:, :3], p_WA), axis=1)
             if np.any(here):
                 x0 = candidates.x0[np.flatnonzero(here)[np.argmax(values[here])]]
-                places = places.join(_at(x0, _lattice(starts, p_WA)))
+                places = places.join(make_lattice(starts, x0))
         found = self._values(situation, objective, places)
         step_m = LATTICE_M
         while step_m > FINE_M:
             high = np.argsort(-found, kind="stable")[:MAX_REFINED]
             high = high[found[high] > found.max() - RISE_PER_M * step_m]
             step_m /= 2.0
-            nearby = _around(starts.stand, places.take(high), step_m)
+            nearby = find_neighbours(starts.stand, places.take(high), step_m)
             places = places.join(nearby)
             found = np.append(found, self._values(situation, objective, nearby))
         return places, found
@@ -179,51 +176,6 @@ def is_apart(situation: Situation, conditions: InitialConditions) -> NDArray[np.
         place = np.array([*failed.p_WR, failed.torso_m])
         apart &= ~same | (np.linalg.norm(conditions.b0 - place, axis=1) >= RETRY_M)
     return apart
-
-
-def _at(x0: Vector, places: Vector) -> InitialConditions:
-    """Returns a tool pose, shape (7,), from n places, shape (n, 3), metres."""
-    return InitialConditions(
-        np.tile(x0, (len(places), 1)), places[:, :2].copy(), places[:, 2].copy()
-    )
-
-
-def _lattice(starts: PointingStarts, p_WA: Vector) -> Vector:
-    """Returns places of the base and heights of the torso, shape (n, 3), metres.
-
-    Among them are all from which a robot has an aperture, with its centre at p_WA, shape (3,),
-    where it had one when it learned: there an L1 kernel has kinks, and an estimate its peaks.
-    """
-    stand, apart = starts.stand, p_WA - starts.all_apertures
-    learned_y = np.add.outer(apart[:, 1], stand.training_y_m)
-    learned_torso = np.add.outer(apart[:, 2], stand.training_torso_m)
-    y = _steps(stand.y_min_m, stand.y_max_m, learned_y)
-    torso = _steps(stand.torso_min_m, stand.torso_max_m, learned_torso)
-    return np.array([[0.0, y_m, torso_m] for y_m in y for torso_m in torso])
-
-
-def _steps(low: float, high: float, more: Vector) -> Vector:
-    """Returns numbers from low to high in steps, and those of more that are between them."""
-    row = np.linspace(low, high, int(np.ceil((high - low) / LATTICE_M - 1e-9)) + 1)
-    inside = more[(more > low) & (more < high)]
-    # To the micrometre, as places are chosen: equal but for rounding is equal.
-    return np.unique(np.round(np.append(row, inside), 6))
-
-
-def _around(stand: Stand, places: InitialConditions, step_m: float) -> InitialConditions:
-    """Returns the eight neighbours of each place, a step away along y, torso or both."""
-    offsets = [
-        [dy, dz] for dy in (-step_m, 0.0, step_m) for dz in (-step_m, 0.0, step_m) if dy or dz
-    ]
-    y_torso = np.repeat(places.b0[:, 1:], len(offsets), axis=0)
-    y_torso += np.tile(offsets, (len(places), 1))
-    low = [stand.y_min_m, stand.torso_min_m]
-    high = [stand.y_max_m, stand.torso_max_m]
-    y_torso = np.round(np.clip(y_torso, low, high), 6)
-    x0 = np.repeat(places.x0, len(offsets), axis=0)
-    _, new = np.unique(np.hstack([x0, y_torso]), axis=0, return_index=True)
-    y_m, torso_m = y_torso[new].T
-    return InitialConditions(x0[new], np.column_stack([np.zeros(len(new)), y_m]), torso_m)
 
 
 def _first_possible(
