@@ -79,12 +79,12 @@ def test_the_optimisation_gains_over_the_grid() -> None:
 
 
 def test_a_peak_between_places_of_the_lattice_is_found() -> None:
-    """The lattice's best place is at a hill of 0.9; beside its places stands a peak of 1."""
+    """The lattice's best place is on a hill of 0.93; beside its places stands a peak of 1."""
 
     class Peaks:
         def values(self, Z: np.ndarray) -> np.ndarray:
-            hill = 0.9 - 0.5 * np.abs(Z[:, 2:4] - [-0.24, 0.9]).sum(axis=1)
-            return np.maximum(hill, 1.0 - 8.0 * np.abs(Z[:, 2:4] - [-0.3275, 0.844]).sum(axis=1))
+            hill = 0.93 - 2.0 * np.abs(Z[:, 2:4] - [-0.24, 0.9]).sum(axis=1)
+            return np.maximum(hill, 1.0 - 8.0 * np.abs(Z[:, 2:4] - [-0.3235, 0.851]).sum(axis=1))
 
         def value_and_gradient(self, z: np.ndarray) -> tuple[float, np.ndarray]:
             return float(self.values(z[None])[0]), np.zeros(5)

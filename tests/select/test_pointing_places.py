@@ -26,11 +26,10 @@ def test_a_lattice_has_where_the_aperture_was_one_of_a_collection() -> None:
 
 
 def test_neighbours_are_on_the_stand_and_each_is_there_once() -> None:
-    assert SCENARIO.task.stand is not None
-    stand = replace(SCENARIO.task.stand, y_min_m=0.0, y_max_m=0.3)
+    stand = SCENARIO.task.stand
     starts = pointing_starts(SCENARIO, SCENARIO.sample_instance("holdout", 0), stand)
     lattice = make_lattice(starts, np.array([*starts.p_WA[0], 1.0, 0.0, 0.0, 0.0]))
-    here = np.flatnonzero(np.isclose(lattice.torso_m, 0.2) & (lattice.p_WR[:, 1] < 0.02))
-    found = find_neighbours(stand, lattice.take(here), 0.025)
-    expected = [[y, z] for y in (0.0, 0.025) for z in (0.175, 0.2, 0.225)]
+    corner = np.isclose(lattice.torso_m, 0.2) & (lattice.p_WR[:, 1] < -0.29)
+    found = find_neighbours(starts.stand, lattice.take(corner), 0.025)
+    expected = [[y, z] for y in (-0.3, -0.275) for z in (0.175, 0.2, 0.225)]
     np.testing.assert_allclose(found.b0[:, 1:], expected)
