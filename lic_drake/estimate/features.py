@@ -153,11 +153,11 @@ class FeatureMap:
         Args:
             first: What the first reach showed, in W, by the names of
                 `lic_drake.experience.second_reach.SHOWN`, metres, radians and m/s.
-            b0: Place (x, y) of the base and height of the torso in the second reach, shape (3,),
-                metres.
+            b0: Place (x, y) of the base and height of the torso in the second reach, shape
+                (..., 3), metres.
 
         Returns:
-            Shape (k,), in the order of `observed`.
+            Shape (..., k), in the order of `observed`.
 
         Raises:
             EstimateError: A value is missing or not finite: the first reach never began.
@@ -168,7 +168,7 @@ class FeatureMap:
                 f"the first reach shows no {self.observed[np.argmin(np.isfinite(seen))]}, as if it"
                 " never began; choose the second start as a first one"
             )
-        moved = self._base_selection(self.observed) @ np.asarray(b0, dtype=float)
+        moved = np.asarray(b0, dtype=float) @ self._base_selection(self.observed).T
         observed: Vector = np.array(seen) - moved
         return observed
 

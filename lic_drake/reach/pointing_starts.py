@@ -1,5 +1,6 @@
 """Where a robot in space may start: the tool in the centre of an aperture, pointing in (IV-B)."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import product
@@ -14,7 +15,11 @@ from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.task import Stand
 from lic_drake.robots.pr2 import Pr2Arm, pr2_arm
-from lic_drake.robots.pr2_inverse import ROBOT_TO_CLUTTER, calc_preselection_cost, solve_pointing
+from lic_drake.robots.pr2_inverse import (
+    ROBOT_TO_CLUTTER,
+    calc_preselection_cost,
+    solve_pointing_from_each,
+)
 from lic_drake.scene.collision import CollisionChecker
 from lic_drake.scene.scene import SceneConfig
 
@@ -139,7 +144,7 @@ class PointingStarts:
         Returns:
             Tool pose in W, shape (7,), and joint angles, shape (7,), radians.
         """
-        return _pre_select(self.checker, p_WA, b0)
+        return next(_pre_select(self.checker, p_WA[None], b0))
 
     @cached_property
     def _table(self) -> tuple[InitialConditions, Vector]:
@@ -236,13 +241,13 @@ def _preselect(
         Pr2Arm(mobile=True), _board(np.array(boxes).reshape(-1, 6)), SceneConfig()
     )
     x0, p_WR, torso, angles = [], [], [], []
-    for y_m, torso_m, p_WE in product(places, heights, np.array(p_WA)):
-        found = _pre_select(checker, p_WE, np.array([0.0, y_m, torso_m]))
-        if found is not None:
-            x0.append(found[0])
-            p_WR.append(np.array([0.0, y_m]))
-            torso.append(torso_m)
-            angles.append(found[1])
+    for y_m, torso_m in product(places, heights):
+        for found in _pre_select(checker, np.array(p_WA), np.array([0.0, y_m, torso_m])):
+            if found is not None:
+                x0.append(found[0])
+                p_WR.append(np.array([0.0, y_m]))
+                torso.append(torso_m)
+                angles.append(found[1])
     conditions = InitialConditions(
         np.array(x0).reshape(-1, 7), np.array(p_WR).reshape(-1, 2), np.array(torso)
     )
@@ -251,19 +256,23 @@ def _preselect(
 
 def _pre_select(
     checker: CollisionChecker, p_WA: Vector, b0: Vector
-) -> tuple[Vector, Vector] | None:
-    """Returns tool pose and joint angles that Eq. (5) prefers; see `PointingStarts.pre_select`."""
+) -> Iterator[tuple[Vector, Vector] | None]:
+    """Yields what Eq. (5) prefers at each aperture; see `PointingStarts.pre_select`."""
     torso_m = float(b0[2])
     arm = pr2_arm().raised(torso_m)
-    q = solve_pointing(arm.kinematics, p_WA - [b0[0], b0[1], 0.0], ROBOT_TO_CLUTTER)
-    q = q[np.argsort(calc_preselection_cost(arm.kinematics, q), kind="stable")]
-    free = _first_free(checker, q, b0[:2], torso_m)
-    if free is None:
-        return None
-    pose = arm.tip_pose(free)
-    # Exactly the centre, and no negative zeros: they would make another key of the same start.
-    pose[:3] = p_WA
-    return pose + 0.0, free
+    p_RA = p_WA - [b0[0], b0[1], 0.0]
+    for p_WE, q in zip(
+        p_WA, solve_pointing_from_each(arm.kinematics, p_RA, ROBOT_TO_CLUTTER), strict=True
+    ):
+        cost = calc_preselection_cost(arm.kinematics, q)
+        free = _first_free(checker, q[np.argsort(cost, kind="stable")], b0[:2], torso_m)
+        if free is None:
+            yield None
+            continue
+        pose = arm.tip_pose(free)
+        # Exactly the centre, and no negative zeros: they would make another key of the same start.
+        pose[:3] = p_WE
+        yield pose + 0.0, free
 
 
 def _first_free(

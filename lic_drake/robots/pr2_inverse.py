@@ -10,6 +10,7 @@ a row of pan angles gives all families of them.
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lic_drake.robots.pr2_kinematics import Pr2Kinematics, Vector
 
@@ -53,7 +54,7 @@ def solve_pose(
         R_R6 = kinematics.calc_pose(*row.tolist()).R_RL[5]
         y_6 = R_R6.T @ R_RE[:, 1]
         row[6] = _wrap(np.arctan2(y_6[2], y_6[1]))
-    return _keep_limits(kinematics, q)
+    return _keep_limits(kinematics, q)[0]
 
 
 def solve_pointing(
@@ -74,8 +75,30 @@ def solve_pointing(
         All configurations within the joint limits, ordered by pan angle, which vary the elbow about
         the line from shoulder to wrist.
     """
-    if pan is None:
-        pan = np.linspace(kinematics.q_min[0], kinematics.q_max[0], NUM_PAN_ANGLES)
+    return _solve(kinematics, p_RE, u_R, _pan_angles(kinematics) if pan is None else pan)[0]
+
+
+def solve_pointing_from_each(kinematics: Pr2Kinematics, p_RE: Vector, u_R: Vector) -> list[Vector]:
+    """Returns what `solve_pointing` does for each of k places, in less time than one by one.
+
+    Args:
+        kinematics: The arm.
+        p_RE: Positions of the tool frame, shape (k, 3), metres.
+        u_R: Unit vector along which the tool points, shape (3,).
+    """
+    pan = _pan_angles(kinematics)
+    q, sample = _solve(kinematics, np.repeat(p_RE, len(pan), axis=0), u_R, np.tile(pan, len(p_RE)))
+    return np.split(q, np.searchsorted(sample, len(pan) * np.arange(1, len(p_RE))))
+
+
+def _pan_angles(kinematics: Pr2Kinematics) -> Vector:
+    return np.linspace(kinematics.q_min[0], kinematics.q_max[0], NUM_PAN_ANGLES)
+
+
+def _solve(
+    kinematics: Pr2Kinematics, p_RE: Vector, u_R: Vector, pan: Vector
+) -> tuple[Vector, NDArray[np.intp]]:
+    """Returns what `solve_pointing` does, and the index of each row's pan angle, shape (n,)."""
     heading = _look_from_shoulder(kinematics, p_RE, u_R, pan)
     _, upper_arm, forearm, _ = kinematics.lengths
     cos_elbow = (np.sum(heading.p_SW**2, axis=1) - upper_arm**2 - forearm**2) / (
@@ -89,15 +112,19 @@ def solve_pointing(
     sin_roll = np.where(is_bent, -heading.p_SW[:, 1], 0.0) / np.where(is_bent, aside, 1.0)
     reaches = (np.abs(cos_elbow) <= 1.0 + _SLACK) & (np.abs(sin_roll) <= 1.0 + _SLACK)
     reaches &= is_bent | (np.abs(heading.p_SW[:, 1]) <= _STRAIGHT)
-    roll = np.arcsin(np.clip(sin_roll, -1.0, 1.0))
+    # What follows is only worked out where the arm is long enough.
+    heading = _Heading(heading.p_SW[reaches], heading.u_S[reaches])
+    pan, elbow, along, aside = (v[reaches] for v in (pan, elbow, along, aside))
+    roll = np.arcsin(np.clip(sin_roll[reaches], -1.0, 1.0))
     branches = [
         _complete(heading, pan, roll, elbow, along, aside),
         _complete(heading, pan, np.pi - roll, elbow, along, aside),
     ]
-    q = np.stack(branches, axis=1)[reaches].reshape(-1, 7)
+    q = np.stack(branches, axis=1).reshape(-1, 7)
     # The roll's range is less than a turn, but does not lie about 0.
     q[:, 2] = kinematics.q_min[2] + np.mod(q[:, 2] - kinematics.q_min[2], 2.0 * np.pi)
-    return _keep_limits(kinematics, q)
+    kept, legal = _keep_limits(kinematics, q)
+    return kept, np.repeat(np.flatnonzero(reaches), 2)[legal]
 
 
 def calc_preselection_cost(
@@ -185,9 +212,13 @@ def _wrap(angle: Vector) -> Vector:
     return wrapped
 
 
-def _keep_limits(kinematics: Pr2Kinematics, q: Vector, tolerance: float = 1e-9) -> Vector:
-    """Returns the rows within the joint limits, what is beyond them by rounding set to them."""
+def _keep_limits(
+    kinematics: Pr2Kinematics, q: Vector, tolerance: float = 1e-9
+) -> tuple[Vector, NDArray[np.bool_]]:
+    """Returns the rows within the joint limits, what is beyond them by rounding set to them.
+
+    The second value tells which rows of q, shape (n, 7), these are, shape (n,).
+    """
     low, high = kinematics.q_min, kinematics.q_max
     legal = np.all((q >= low - tolerance) & (q <= high + tolerance), axis=1)
-    kept: Vector = np.clip(q[legal], low, high)
-    return kept
+    return np.clip(q[legal], low, high), legal

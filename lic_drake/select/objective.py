@@ -69,7 +69,7 @@ class Objective:
             return self.model.estimator.values(features.join(p_RG, x0))
         estimates = []
         for failed in self.failed:
-            seen = np.array([features.observation(failed.shown, b) for b in conditions.b0])
+            seen = features.observation(failed.shown, conditions.b0)
             estimates.append(self.model.estimator.values(features.join(p_RG, x0, seen)))
         least: Vector = np.min(estimates, axis=0)
         return least

@@ -1,7 +1,6 @@
 """LIC's optimisation for a PR2 before a board of apertures."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,21 +9,25 @@ from scipy.optimize import minimize
 from lic_drake.errors import RequestError
 from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.reach.pointing_starts import PointingStarts
-from lic_drake.reach.task import Stand
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.objective import SuccessObjective
+from lic_drake.select.pointing_places import LATTICE_M, find_neighbours, make_lattice
 from lic_drake.select.pointing_program import PointingProgram
 from lic_drake.select.situation import Situation
 
 Vector = NDArray[np.float64]
 
-LATTICE_M = 0.02
-"""Distance of neighbouring places of the base and heights of the torso that are compared before
-solving. From the grid's best places alone the solver's end was below the best of 20,000 samples in
-two of five situations, by up to 5 points: an L1 kernel has kinks, where it stops."""
-
 FINE_M = 0.003
-"""The same around the best place, up to the neighbours in the coarser lattice."""
+"""Around the best places of a lattice the distance of places is halved until it is at most this."""
+
+RISE_PER_M = 5.0
+"""Beside a place an estimate may be higher than there by this times the distance: the second stage
+of LIC-2 has crests where the first one's estimate has a certain value, and an L1 kernel has kinks,
+where a solver stops. From the best place of each aperture alone its end was below the best of
+20,000 samples in every fifth situation, by up to 17 points."""
+
+MAX_REFINED = 150
+"""Only around so many places, the best ones of all apertures, others are looked at."""
 
 MAX_TRIED = 40
 """So many places at an aperture are tried, the best first, until the arm can be there."""
@@ -62,24 +65,15 @@ class PointingLic(LicSelector):
         values: Vector,
     ) -> Iterator[InitialConditions]:
         starts = _pointing(situation)
-        lattice = _lattice(starts.stand, LATTICE_M)
-        places = []
-        for p_WA in starts.p_WA:
-            here = np.all(np.isclose(candidates.x0[:, :3], p_WA), axis=1)
-            if np.any(here):
-                x0 = candidates.x0[np.flatnonzero(here)[np.argmax(values[here])]]
-                places.append((x0, self._values(situation, objective, x0, lattice)))
-        places.sort(key=lambda place: -place[1].max())
+        places, found = self._search(situation, objective, candidates, values)
         best = float(values.max())
-        for x0, found in places:
-            if found.max() < best - MAX_GAIN:
+        apertures = [np.all(np.isclose(places.x0[:, :3], p_WA), axis=1) for p_WA in starts.p_WA]
+        for here in sorted(apertures, key=lambda here: -found.max(where=here, initial=-np.inf)):
+            if found.max(where=here, initial=-np.inf) < best - MAX_GAIN:
                 break
-            start = _first_possible(starts, x0[:3], lattice, found)
+            start = _first_possible(starts, places.take(here), found[here])
             if start is None:
                 continue
-            fine = _lattice(_around(starts.stand, start[1]), FINE_M)
-            nearby = self._values(situation, objective, x0, fine)
-            start = _first_possible(starts, x0[:3], fine, nearby) or start
             for pose, b0 in (start, self._solve(starts, objective, *start)):
                 condition = InitialConditions(pose[None], b0[None, :2], b0[2:])
                 possible = starts.angles(pose, b0[:2], b0[2]) is not None
@@ -88,15 +82,41 @@ class PointingLic(LicSelector):
                     value = objective.values(condition) * self._chance(situation, condition)
                     best = max(best, float(value[0]))
 
+    def _search(
+        self,
+        situation: Situation,
+        objective: SuccessObjective,
+        candidates: InitialConditions,
+        values: Vector,
+    ) -> tuple[InitialConditions, Vector]:
+        """Returns places at all apertures, denser where estimates are high, and the estimates.
+
+        An aperture has the tool pose of its best candidate.
+        """
+        starts = _pointing(situation)
+        places = candidates.take(np.zeros(0, dtype=int))
+        for p_WA in starts.p_WA:
+            here = np.all(np.isclose(candidates.x0[:, :3], p_WA), axis=1)
+            if np.any(here):
+                x0 = candidates.x0[np.flatnonzero(here)[np.argmax(values[here])]]
+                places = places.join(make_lattice(starts, x0))
+        found = self._values(situation, objective, places)
+        step_m = LATTICE_M
+        while step_m > FINE_M:
+            high = np.argsort(-found, kind="stable")[:MAX_REFINED]
+            high = high[found[high] > found.max() - RISE_PER_M * step_m]
+            step_m /= 2.0
+            nearby = find_neighbours(starts.stand, places.take(high), step_m)
+            places = places.join(nearby)
+            found = np.append(found, self._values(situation, objective, nearby))
+        return places, found
+
     def _values(
-        self, situation: Situation, objective: SuccessObjective, x0: Vector, places: Vector
+        self, situation: Situation, objective: SuccessObjective, places: InitialConditions
     ) -> Vector:
-        """Returns the estimates of a tool pose from places, shape (n, 3): shape (n,)."""
-        at = InitialConditions(
-            np.tile(x0, (len(places), 1)), places[:, :2].copy(), places[:, 2].copy()
-        )
-        values = objective.values(at) * self._chance(situation, at)
-        return np.where(is_apart(situation, at), values, -np.inf)
+        """Returns the estimates of n places, -inf for those that are not allowed, shape (n,)."""
+        values = objective.values(places) * self._chance(situation, places)
+        return np.where(is_apart(situation, places), values, -np.inf)
 
     def _solve(
         self, starts: PointingStarts, objective: SuccessObjective, x0: Vector, b0: Vector
@@ -158,40 +178,15 @@ def is_apart(situation: Situation, conditions: InitialConditions) -> NDArray[np.
     return apart
 
 
-def _lattice(stand: Stand, step_m: float) -> Vector:
-    """Returns places of the base and heights of the torso, shape (n, 3), metres."""
-    y = _steps(stand.y_min_m, stand.y_max_m, step_m)
-    torso = _steps(stand.torso_min_m, stand.torso_max_m, step_m)
-    return np.array([[0.0, y_m, torso_m] for y_m in y for torso_m in torso])
-
-
-def _steps(low: float, high: float, step: float) -> Vector:
-    return np.linspace(low, high, int(np.ceil((high - low) / step - 1e-9)) + 1)
-
-
-def _around(stand: Stand, b0: Vector) -> Stand:
-    """Returns the part of where base and torso may be that is around a place."""
-    _, y_m, torso_m = b0
-    return replace(
-        stand,
-        y_min_m=max(stand.y_min_m, y_m - LATTICE_M),
-        y_max_m=min(stand.y_max_m, y_m + LATTICE_M),
-        torso_min_m=max(stand.torso_min_m, torso_m - LATTICE_M),
-        torso_max_m=min(stand.torso_max_m, torso_m + LATTICE_M),
-        training_y_m=[y_m],
-        training_torso_m=[torso_m],
-    )
-
-
 def _first_possible(
-    starts: PointingStarts, p_WA: Vector, places: Vector, values: Vector
+    starts: PointingStarts, places: InitialConditions, values: Vector
 ) -> tuple[Vector, Vector] | None:
     """Returns tool pose and place, shape (7,) and (3,), of the best place where the arm can be."""
     for i in np.argsort(-values, kind="stable")[:MAX_TRIED]:
         if values[i] == -np.inf:
             break
-        b0 = _inside(starts, places[i])
-        found = starts.pre_select(p_WA, b0)
+        b0 = _inside(starts, places.b0[i])
+        found = starts.pre_select(places.x0[i, :3], b0)
         if found is not None:
             return found[0], b0
     return None

@@ -5,7 +5,12 @@ from hypothesis import strategies as st
 from pr2_reference import link_poses
 
 from lic_drake.robots.pr2 import Pr2Arm
-from lic_drake.robots.pr2_inverse import calc_preselection_cost, solve_pointing, solve_pose
+from lic_drake.robots.pr2_inverse import (
+    calc_preselection_cost,
+    solve_pointing,
+    solve_pointing_from_each,
+    solve_pose,
+)
 
 STAND = ((0.3, -0.2, 0.5), 0.15)
 ARM = Pr2Arm(*STAND)
@@ -140,3 +145,10 @@ def test_the_cheapest_configuration_lays_the_forearm_along_the_way_in() -> None:
     assert along[np.argmin(cost)] == pytest.approx(along.max(), abs=1e-12)
     # The wrist lies 0.18 m behind the tool, the elbow at most a forearm behind the wrist.
     assert cost.min() >= 1.0 / (0.18 + (0.18 + 0.321))
+
+
+def test_places_solved_at_once_have_the_same_bits_as_one_by_one() -> None:
+    ahead = np.array([1.0, 0.0, 0.0])
+    p_RE = np.array([[0.6, -0.3, 0.8], [9.0, 0.0, 0.0], [0.55, -0.1, 0.9], [0.5, -0.6, 1.0]])
+    for p, q in zip(p_RE, solve_pointing_from_each(ARM.kinematics, p_RE, ahead), strict=True):
+        np.testing.assert_array_equal(q, solve_pointing(ARM.kinematics, p, ahead))

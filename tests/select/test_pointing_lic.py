@@ -78,6 +78,22 @@ def test_the_optimisation_gains_over_the_grid() -> None:
     assert max(gains) > 0.02
 
 
+def test_a_peak_between_places_of_the_lattice_is_found() -> None:
+    """The lattice's best place is on a hill of 0.93; beside its places stands a peak of 1."""
+
+    class Peaks:
+        def values(self, Z: np.ndarray) -> np.ndarray:
+            hill = 0.93 - 2.0 * np.abs(Z[:, 2:4] - [-0.24, 0.9]).sum(axis=1)
+            return np.maximum(hill, 1.0 - 8.0 * np.abs(Z[:, 2:4] - [-0.3235, 0.851]).sum(axis=1))
+
+        def value_and_gradient(self, z: np.ndarray) -> tuple[float, np.ndarray]:
+            return float(self.values(z[None])[0]), np.zeros(5)
+
+    model = SuccessModel(estimator=Peaks(), features=SPACE_LIC1)  # type: ignore[arg-type]
+    chosen = PointingLic(model).select(situation(3))
+    assert chosen.probability == pytest.approx(1.0, abs=0.03)
+
+
 def test_a_translated_situation_has_a_translated_answer() -> None:
     """Board, goal and the range of the base move 0.1 m to the left: so does the answer."""
     clutter = "{{clutter: {{board_centre: [0.53, {0}, 0.89]}}, task: {{stand: {{y_min_m: {1},"
