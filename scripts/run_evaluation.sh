@@ -60,6 +60,8 @@ evaluate_pr2() {
 }
 evaluate_pr2
 evaluate_pr2 --still --variant still
+python scripts/measure_bounds.py sphere-aperture-clutter --environments 100 --still \
+    --set '{clutter: {num_blocked: 10}}'
 
 # Before foliage: apertures and goal seen by cameras or known; learned among spheres or foliage.
 evaluate_foliage() {

@@ -1,7 +1,9 @@
+from dataclasses import replace
+
 import numpy as np
 from trial_rows import make_rows
 
-from lic_drake.evaluate.space_table import space_table
+from lic_drake.evaluate.space_table import oracle_table, space_table
 from lic_drake.evaluate.statistics import mcnemar
 from lic_drake.evaluate.trials import TrialTable
 
@@ -36,3 +38,17 @@ def cells_of_half() -> tuple[str]:
 
 def _array(values: list[bool]) -> np.ndarray:
     return np.array(values)
+
+
+def test_the_oracle_is_right_where_any_aperture_leads_to_the_goal() -> None:
+    rows = [*make_rows("rnd", ["00", "1", "1"]), *make_rows("gp", ["01", "00", "1"])]
+    trials = TrialTable([replace(row, variant="still") for row in rows])
+    columns = {
+        "environment": np.array([0, 0, 1, 1]),
+        "success": np.array([False, True, False, False]),
+    }
+    cells = {row[:2]: row[2:] for row in oracle_table(trials, columns).rows if row is not None}
+    assert cells["", "oracle: any open aperture"][2] == "1/2"
+    assert cells["1st attempt", "LIC(GP)"][2] == "0/2"
+    assert cells["total of two", "LIC(GP)"][2] == "1/2"
+    assert cells["total of two", "any of the strategies"][2] == "2/2"
