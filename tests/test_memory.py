@@ -196,3 +196,14 @@ def test_five_thousand_reaches_need_no_more_memory_than_five_hundred() -> None:
     growth = growth_mb(lambda i: run_reach(requests[i]), 500, 5000)
     print(f"grew by {growth:.1f} MB")
     assert growth < 30.0
+
+
+@pytest.mark.slow
+def test_three_hundred_reaches_of_the_pr2_need_no_more_memory_than_a_hundred() -> None:
+    scenario = load_scenario(
+        "sphere-aperture-clutter", "{clutter: {num_blocked: 10}, stop: {timeout_s: 2.0}}"
+    )
+    requests = random_requests(scenario, "training", 60, 5)
+    growth = growth_mb(lambda i: run_reach(requests[i]), 100, 300)
+    print(f"grew by {growth:.1f} MB")
+    assert growth < 15.0

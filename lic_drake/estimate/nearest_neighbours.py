@@ -40,7 +40,9 @@ class NearestNeighbours:
 
     The spread is the standard deviation of the weighted average if each reach is an independent
     draw (Kish's effective sample size, Jeffreys' prior). It knows nothing of the luck that
-    reaches in one environment share, nor of the bias that averaging over neighbours brings.
+    reaches in one environment share, nor of the bias that averaging over neighbours brings. Where
+    neighbours are sparse the estimate is too sure of itself: among the PR2's starts that it gave
+    0.8 to 1 (mean 0.87) 0.62 succeeded.
 
     Attributes:
         neighbours: K, the number of distinct feature vectors averaged.
