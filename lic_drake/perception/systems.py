@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from typing import cast
-from weakref import WeakMethod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,10 @@ from lic_drake.perception.config import CameraConfig
 from lic_drake.perception.goal import find_goal
 from lic_drake.perception.image import CameraImage
 from lic_drake.perception.noise import disturbed_image
+from lic_drake.weak_method import weakly
+
+type _Calc = Callable[[object, object], None]
+"""What Drake's stubs want a calculation to be."""
 
 
 class DisturbedCamera(LeafSystem):
@@ -44,7 +47,9 @@ class DisturbedCamera(LeafSystem):
         ):
             self.DeclareAbstractInputPort(name, Value(value))
         self.DeclareVectorInputPort("look", 1)
-        self.DeclareAbstractOutputPort("image", _make_nothing, _weakly(self._calc_image))
+        self.DeclareAbstractOutputPort(
+            "image", _make_nothing, weakly(cast(_Calc, self._calc_image))
+        )
 
     def _calc_image(self, context: Context, output: AbstractValue) -> None:
         look = int(np.asarray(self.GetInputPort("look").Eval(context))[0])
@@ -68,7 +73,9 @@ class Detector(LeafSystem):
         super().__init__()
         self._find = find
         self.DeclareAbstractInputPort("image", _make_nothing())
-        self.DeclareAbstractOutputPort("found", _make_nothing, _weakly(self._calc_found))
+        self.DeclareAbstractOutputPort(
+            "found", _make_nothing, weakly(cast(_Calc, self._calc_found))
+        )
 
     def _calc_found(self, context: Context, output: AbstractValue) -> None:
         image = cast(CameraImage, self.GetInputPort("image").Eval(context))
@@ -100,21 +107,6 @@ def camera_image(
         R_WC=np.array(X_WC.rotation().matrix()),
         p_WC=np.array(X_WC.translation()),
     )
-
-
-def _weakly(calc: Callable[[Context, AbstractValue], None]) -> Callable[[object, object], None]:
-    """Returns a method as a function that does not keep its system alive.
-
-    In Drake 1.58 an abstract output port keeps what it is given for ever, and with it the diagram.
-    """
-    method = WeakMethod(calc)
-
-    def call(context: object, output: object) -> None:
-        bound = method()
-        assert bound is not None  # A port dies with its system.
-        bound(cast(Context, context), cast(AbstractValue, output))
-
-    return call
 
 
 class _Nothing:

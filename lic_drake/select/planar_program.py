@@ -8,6 +8,7 @@ from pydrake.solvers import MathematicalProgram, NloptSolver, SolverOptions
 from lic_drake.reach.starts import Region
 from lic_drake.robots.planar_kinematics import PlanarArmKinematics
 from lic_drake.select.objective import SuccessObjective
+from lic_drake.weak_method import weakly
 
 Vector = NDArray[np.float64]
 
@@ -38,9 +39,9 @@ class PlanarProgram:
             np.zeros(5), np.zeros(5), np.concatenate([self.x0, self.b0])
         )
         self.program.AddConstraint(
-            self._hand_error, np.zeros(3), np.zeros(3), self.program.decision_variables()
+            weakly(self._hand_error), np.zeros(3), np.zeros(3), self.program.decision_variables()
         )
-        self.program.AddCost(self._cost, np.concatenate([self.x0, self.b0]))
+        self.program.AddCost(weakly(self._cost), np.concatenate([self.x0, self.b0]))
         self._options = SolverOptions()
         # Kinks of the L1 kernel can make the solver crawl; the result is checked anyway.
         self._options.SetOption(NloptSolver.id(), NloptSolver.MaxEvalName(), 60)

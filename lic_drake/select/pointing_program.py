@@ -9,6 +9,7 @@ from pydrake.solvers import MathematicalProgram, SnoptSolver, SolverOptions
 from lic_drake.reach.pointing_starts import PointingStarts
 from lic_drake.robots.pr2 import Pr2Arm
 from lic_drake.select.objective import SuccessObjective
+from lic_drake.weak_method import weakly
 
 Vector = NDArray[np.float64]
 
@@ -46,7 +47,7 @@ class PointingProgram:
             self.b0,
         )
         self.program.AddBoundingBoxConstraint(self._arm.q_min, self._arm.q_max, self.q)
-        self.program.AddConstraint(self._tool_error, np.zeros(5), np.zeros(5), everything)
+        self.program.AddConstraint(weakly(self._tool_error), np.zeros(5), np.zeros(5), everything)
         self.program.AddConstraint(
             MinimumDistanceLowerBoundConstraint(
                 plant=starts.checker.plant,
@@ -56,7 +57,7 @@ class PointingProgram:
             ),
             everything,
         )
-        self.program.AddCost(self._cost, everything)
+        self.program.AddCost(weakly(self._cost), everything)
         # Of Drake's solvers the one that gained most (NLopt's SLSQP two thirds of it): kinks of the
         # L1 kernel make it report failure at good points, which are checked anyway.
         self._options = SolverOptions()
