@@ -5,7 +5,7 @@ VENV := .venv
 PYTHON_IN_VENV := $(VENV)/bin/python
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo test lint docs tables evaluation clean
+.PHONY: setup demo test lint docs notebooks tables evaluation clean
 .DELETE_ON_ERROR:
 
 setup: $(STAMP)
@@ -25,7 +25,11 @@ lint: $(STAMP)
 docs: $(STAMP)
 	$(PYTHON_IN_VENV) -W error -m pdoc --docformat google --output-directory out/docs lic_drake
 
-# Tables I to IV, bounds and figures from the committed records, in seconds.
+# All notebooks, run as they are, with their outputs in out/notebooks; one that fails is an error.
+notebooks: $(STAMP)
+	$(PYTHON_IN_VENV) scripts/run_notebooks.py --out out/notebooks notebooks/*.ipynb
+
+# Tables I to IV, bounds and figures from the committed records, in a minute.
 tables: $(STAMP)
 	for table in 1_cylinder 2_t_tests 3_passage 4_aperture; do \
 	  $(PYTHON_IN_VENV) scripts/table_$$table.py || exit 1; done
@@ -46,6 +50,7 @@ $(STAMP): pyproject.toml
 	@PYTHON=$(PYTHON_IN_VENV) scripts/find_python.sh >/dev/null 2>&1 || { \
 	  python=$$(scripts/find_python.sh) && echo "creating $(VENV) with $$python" && \
 	  "$$python" -m venv --clear $(VENV); }
+	@echo "installing Drake and what else is needed into $(VENV); this takes some minutes"
 	$(PYTHON_IN_VENV) -m pip install --disable-pip-version-check --quiet --editable '.[dev,cluster]'
 	@$(PYTHON_IN_VENV) -c 'import pydrake.common' || { \
 	  echo "Drake does not load; on Debian and Ubuntu: apt-get install libglib2.0-0" >&2; exit 1; }

@@ -1,6 +1,6 @@
-"""Runs notebooks in place and keeps their outputs, all but the large ones.
+"""Runs notebooks in place and keeps their outputs, all but the large ones; or into a folder.
 
-Usage: python scripts/run_notebooks.py notebooks/one_reach.ipynb ...
+Usage: python scripts/run_notebooks.py [--out FOLDER] notebooks/one_reach.ipynb ...
 """
 
 import argparse
@@ -19,7 +19,13 @@ def run_notebook(path: Path) -> nbformat.NotebookNode:
     """Returns a notebook with the outputs that it has where it lies."""
     notebook: nbformat.NotebookNode = nbformat.read(path, as_version=4)  # type: ignore[no-untyped-call]
     where = {"metadata": {"path": path.parent}}
-    NotebookClient(notebook, timeout=300, kernel_name="python3", resources=where).execute()
+    NotebookClient(
+        notebook,
+        timeout=300,
+        kernel_name="python3",
+        resources=where,
+        extra_arguments=["--log-level=ERROR"],  # Not that its sockets are those of this machine.
+    ).execute()
     return notebook
 
 
@@ -39,13 +45,25 @@ def main() -> None:
     """Runs the notebooks that the command line names."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("notebooks", nargs="+", type=Path, metavar="NOTEBOOK.ipynb")
-    for path in parser.parse_args().notebooks:
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="FOLDER",
+        help="write them there, with all outputs (default: in place, without the large ones)",
+    )
+    args = parser.parse_args()
+    for path in args.notebooks:
         began = time.perf_counter()
         notebook = run_notebook(path)
-        keep_small_outputs(notebook)
-        nbformat.write(notebook, path)  # type: ignore[no-untyped-call]
-        size = path.stat().st_size
-        print(f"{path}: {time.perf_counter() - began:.0f} s, {size / 1000:.0f} kB")
+        written = path
+        if args.out is None:
+            keep_small_outputs(notebook)
+        else:
+            args.out.mkdir(parents=True, exist_ok=True)
+            written = args.out / path.name
+        nbformat.write(notebook, written)  # type: ignore[no-untyped-call]
+        seconds, size = time.perf_counter() - began, written.stat().st_size
+        print(f"{written}: {seconds:.0f} s, {size / 1000:.0f} kB", flush=True)
 
 
 if __name__ == "__main__":

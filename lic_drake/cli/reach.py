@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lic_drake.cli.arguments import Subparsers, add_scenario_arguments
+from lic_drake.cli.arguments import Subparsers, add_scenario_arguments, non_negative_int
 
 if TYPE_CHECKING:
     from lic_drake.reach.request import ReachRecord, ReachRequest
@@ -32,7 +32,11 @@ def add_parser(subparsers: Subparsers) -> None:
         " (default: %(default)s)",
     )
     parser.add_argument(
-        "--environment", type=int, default=0, metavar="N", help="its index in it (default: 0)"
+        "--environment",
+        type=non_negative_int,
+        default=0,
+        metavar="N",
+        help="its index in it (default: 0)",
     )
     parser.add_argument(
         "--goal",
@@ -117,12 +121,15 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _check_writable(path: Path) -> None:
-    """Finds out before the simulation that a file cannot be written."""
+    """Finds out before the simulation that a file cannot be written; leaves none behind."""
     from lic_drake.errors import LicError
 
+    is_new = not path.exists()
     try:
         with path.open("ab"):
             pass
+        if is_new:
+            path.unlink()
     except OSError as error:
         raise LicError(f"cannot write {path}: {error.strerror}; choose another path") from None
 

@@ -19,6 +19,7 @@ from lic_drake.evaluate.trial import Attempt, run_trial
 from lic_drake.experience.added import added_columns
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.perception.config import CamerasConfig
+from lic_drake.perception.rendering import make_renderer
 from lic_drake.reach.pointing_starts import PointingStarts
 from lic_drake.reach.request import IN_PLANE, ReachRecord, ReachRequest, is_within_reach
 from lic_drake.reach.rollout import make_record, simulate_request
@@ -70,7 +71,8 @@ def demonstrate(
         seed: Chooses the environment and the goal.
         out: Folder for demo.html, demo.json, path.png, the stills of `save_stills` and, in the
             plane, density.png, before a board of apertures apertures.png; with cameras also
-            sequence.html, views.webp, look1.png and so on.
+            sequence.html, views.webp, look1.png and so on. Those of an earlier demonstration there
+            are removed.
         attempts: How many reaches at the most.
         say: Gets a line for every step.
         meshes: What a PR2 wears in the pictures instead of the shapes of its model.
@@ -79,9 +81,12 @@ def demonstrate(
 
     Raises:
         LicError: The folder cannot be written, or the method or library cannot be used.
+        RenderingError: There are cameras, which cannot be simulated on this machine.
     """
     needs_library(method)
     _make_folder(out)
+    if cameras is not None:
+        make_renderer()  # Before the library is learned from.
     arm = scenario.arm()
     instance = scenario.sample_instance("evaluation", seed)
     starts = make_starts(scenario, instance)
@@ -150,6 +155,7 @@ def demonstrate(
     if not isinstance(chosen, LicSelector):  # Shows what LIC would have thought of the choices.
         chosen = make_selector("gp", arm, columns, category=scenario.category, added=added)
     assert isinstance(chosen, LicSelector)
+    _remove_pictures(out)
     files = {**pictures.save(out, chosen, done), "data": out / "demo.json"}
     files |= save_stills(scenario, instance, p_WG, done, traces, out, say, meshes)
     last = done[-1].record
@@ -219,6 +225,13 @@ def _make_folder(out: Path) -> None:
         raise LicError(
             f"cannot write into {out}: {error.strerror}; choose another folder with --out"
         ) from None
+
+
+def _remove_pictures(out: Path) -> None:
+    """Removes an earlier demonstration's pictures, some of which this one may not have."""
+    for pattern in ("density.png", "apertures.png", "look[1-9].png", "views.webp", "sequence.html"):
+        for old in out.glob(pattern):
+            old.unlink()
 
 
 def _write_json(result: Demonstration, method: str, seed: int) -> None:

@@ -164,7 +164,8 @@ def _read(path: Path, columns: list[str] | None) -> tuple[TableHeader, pa.Table]
         if number is not None:
             raise LibraryError(f"cannot read {path}: {os.strerror(number)}") from None
         raise LibraryError(
-            f"{path} is damaged or not a Parquet file; delete it and collect its reaches again"
+            f"{path} is damaged or not a Parquet file; if it belongs to a library, delete it and"
+            " collect its reaches again"
         ) from error
 
 

@@ -112,12 +112,12 @@ def test_a_recording_leaves_the_output_to_the_command(tmp_path: Path) -> None:
         (["--set", "{"], "overrides: not YAML: "),
         (["--set", "{mpc: {preset: best}}"], "unknown mpc preset 'best'"),
         (["--stream", "test"], "unknown seed stream 'test'; choose one of training, evaluation"),
-        (["--environment", "-1"], "seed indices must be from 0 to 2^32 - 1, got [-1]"),
         (["--environment", "4294967296"], "seed indices must be from 0 to 2^32 - 1, got"),
         (["--diagram", "{tmp}/none/a.svg"], "cannot write {tmp}/none/a.svg: "),
         (["--diagram", "{tmp}/a.docx"], "cannot write the drawing {tmp}/a.docx: "),
         (["--record", "{tmp}/none/a.html"], "cannot write {tmp}/none/a.html: No such file"),
         (["--record", "{tmp}"], "cannot write {tmp}: Is a directory"),
+        (["--record", "{tmp}/a.html", "--start-y", "9"], "cannot start at y 9 m"),
     ],
 )
 def test_a_mistake_is_one_line_and_exit_code_2(
@@ -130,6 +130,7 @@ def test_a_mistake_is_one_line_and_exit_code_2(
     assert output.err.startswith("lic: error: ")
     assert output.err.count("\n") == 1
     assert message.replace("{tmp}", str(tmp_path)) in output.err
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_start_in_the_clutter_is_a_mistake(capsys: pytest.CaptureFixture[str]) -> None:
@@ -140,7 +141,10 @@ def test_a_start_in_the_clutter_is_a_mistake(capsys: pytest.CaptureFixture[str])
     assert "the arm touches the clutter at its start" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("arguments", [["--goal", "a", "b"], ["--environment", "1.5"], ["--set"]])
+@pytest.mark.parametrize(
+    "arguments",
+    [["--goal", "a", "b"], ["--environment", "1.5"], ["--environment", "-1"], ["--set"]],
+)
 def test_what_argparse_refuses_has_exit_code_2(
     capsys: pytest.CaptureFixture[str], arguments: list[str]
 ) -> None:

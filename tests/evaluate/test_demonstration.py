@@ -85,9 +85,15 @@ def test_demonstration_writes_what_it_did_and_the_reaches_are_those_of_run_reach
 def test_second_attempt_starts_elsewhere_and_finds_what_the_first_left(
     small_library: ExperienceLibrary, tmp_path: Path
 ) -> None:
+    old = ("density.png", "apertures.png", "look2.png", "views.webp", "sequence.html", "mine.png")
+    for name in old:  # Of a demonstration of another kind.
+        (tmp_path / name).touch()
     result = demonstrate(
         small_library.scenario(), small_library, "knn1", 3, tmp_path, say=lambda line: None
     )
+    assert {path.name for path in tmp_path.iterdir()} == {
+        *("demo.html", "demo.json", "density.png", "path.png", "mine.png")
+    }
     first, second = result.attempts
     assert first.record.outcome == second.record.outcome == "timeout"
     assert abs(first.selection.x0[1] - second.selection.x0[1]) > 0.1

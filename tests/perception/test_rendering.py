@@ -21,6 +21,21 @@ except LicError as error:
 """
 
 
+def test_the_foliage_demo_is_refused_in_one_line_before_it_learns(tmp_path: Path) -> None:
+    (tmp_path / "libEGL.so.1").touch()
+    demo = ["demo", "--robot", "pr2", "--category", "foliage-aperture-clutter"]
+    result = subprocess.run(
+        [sys.executable, "-m", "lic_drake", *demo, "--out", str(tmp_path / "out")],
+        env={**os.environ, "LD_LIBRARY_PATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+    )
+    assert (result.returncode, result.stdout) == (2, "")
+    assert result.stderr.startswith("lic: error: cameras cannot be simulated: ")
+    assert result.stderr.endswith("apt-get install libegl1 libgl1 libgl1-mesa-dri\n")
+    assert result.stderr.count("\n") == 1
+
+
 @pytest.mark.parametrize(
     "files", [("libEGL.so.1", "libEGL.so"), ("libGL.so.1", "libGL.so", "libGLdispatch.so.0")]
 )
