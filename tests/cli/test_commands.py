@@ -50,10 +50,13 @@ def test_it_says_what_it_does_in_one_line_and_at_length_and_gives_an_example(
     assert line[0].islower() and not line.endswith(".")
     assert parser.description and parser.description[0].isupper()
     assert parser.description.endswith(".")
-    assert parser.epilog is not None and parser.epilog.startswith(f"example: {name}")
-    example = shlex.split(parser.epilog.removeprefix("example: "))
-    assert example[0] == "lic"
-    assert callable(make_parser().parse_args(example[1:]).run)
+    assert parser.epilog is not None
+    several, _, text = parser.epilog.partition(": ")
+    examples = text.split("; ")
+    assert several == ("example" if len(examples) == 1 else "examples")
+    for example in examples:
+        assert example.startswith(name)
+        assert callable(make_parser().parse_args(shlex.split(example)[1:]).run)
     with pytest.raises(SystemExit) as end:
         main([*name.split()[1:], "--help"])
     assert end.value.code == 0
@@ -106,7 +109,7 @@ WRONG = [
     ("reach --scenario jungle", "shipped scenarios: "),
     ("reach --goal 5 0", "choose a nearer goal"),
     ("reach --goal nan 0", "finite"),
-    ("reach --environment -1", "from 0 to"),
+    ("reach --environment 4294967296", "from 0 to"),
     ("reach --stream jungle", "choose one of training"),
     ("reach --set {{mpc:", "not YAML"),
     ("reach --record {none}/a/b.html", "choose another path"),
