@@ -11,7 +11,10 @@ mean over directions at the straight arm, `body_invweight0`). So a stiffness in 
 
 from dataclasses import dataclass
 
-import mujoco
+try:
+    import mujoco
+except ImportError:
+    raise SystemExit("MuJoCo is not installed; get it with: pip install -e '.[bench]'") from None
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.multibody.plant import MultibodyPlant
