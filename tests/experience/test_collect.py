@@ -268,7 +268,7 @@ def test_a_damaged_shard_is_named_and_its_reaches_come_back_after_its_deletion(
     run(library, reach)
     shard = library.shard_path("training-000001")
     shard.write_bytes(shard.read_bytes()[:-50])
-    with pytest.raises(LibraryError, match=r"training-000001\.parquet is damaged .*; delete it"):
+    with pytest.raises(LibraryError, match=r"training-000001\.parquet is damaged .*, delete it"):
         run(library, reach)
     shard.unlink()
     run(library, reach)

@@ -21,6 +21,7 @@ except LicError as error:
 """
 
 
+@pytest.mark.slow
 def test_the_foliage_demo_is_refused_in_one_line_before_it_learns(tmp_path: Path) -> None:
     for name in ("libEGL.so.1", "libEGL.so"):
         (tmp_path / name).touch()
