@@ -14,7 +14,7 @@ from lic_drake.seeds import make_generator
 Vector = NDArray[np.float64]
 
 MAX_NEWTON_STEPS = 10
-"""Of the inverse kinematics along that way; two suffice where the arm is not stretched out."""
+"""Of the inverse kinematics along that way; where they do not suffice, the way ends."""
 
 WAITING_DEG = np.array([-70.0, 40.0, -90.0, -125.0, 0.0, -60.0, 0.0])
 """A posture of ours for looking and driving: elbow out to the side, hand close before the body."""
