@@ -12,15 +12,15 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from matplotlib.image import imsave
 
-from lic_drake.evaluate.plots import save_figure
 from lic_drake.perception.apertures import find_apertures
 from lic_drake.perception.belief import board_of
 from lic_drake.perception.config import load_cameras
-from lic_drake.perception.drawing import draw_apertures, draw_goal
 from lic_drake.perception.goal import find_goal
 from lic_drake.perception.views import disturbed, take_views
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.seeds import make_generator
+from lic_drake.show.drawing import draw_apertures, draw_goal
+from lic_drake.show.plots import save_figure
 
 
 def main() -> int:

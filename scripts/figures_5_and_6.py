@@ -10,8 +10,6 @@ import sys
 from pathlib import Path
 
 from lic_drake.errors import LicError
-from lic_drake.evaluate.attempt_figures import densities_figure, snapshots_figure
-from lic_drake.evaluate.plots import save_figure
 from lic_drake.evaluate.report import RESULTS, load_trials
 from lic_drake.evaluate.trial import run_trial
 from lic_drake.experience.store import ExperienceLibrary
@@ -19,6 +17,8 @@ from lic_drake.paths import shipped_library
 from lic_drake.reach.starts import make_starts
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.registry import make_selector
+from lic_drake.show.attempt_figures import densities_figure, snapshots_figure
+from lic_drake.show.plots import save_figure
 
 
 def main() -> int:

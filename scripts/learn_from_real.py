@@ -16,7 +16,6 @@ from matplotlib.figure import Figure
 from lic_drake.errors import LicError
 from lic_drake.evaluate.batch import random_requests, simulate_requests
 from lic_drake.evaluate.experiment import Evaluation
-from lic_drake.evaluate.plots import save_figure
 from lic_drake.evaluate.real_experience import (
     Learned,
     draw_success_by_records,
@@ -29,6 +28,7 @@ from lic_drake.evaluate.statistics import count
 from lic_drake.evaluate.trials import TrialTable, read_trials
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
+from lic_drake.show.plots import save_figure
 
 CATEGORY = "passage-clutter"
 REAL = "{clutter: {min_slope_deg: -10.0, max_slope_deg: 10.0}}"

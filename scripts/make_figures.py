@@ -10,8 +10,8 @@ from pathlib import Path
 
 from lic_drake.errors import LicError
 from lic_drake.evaluate.gallery import FIGURES
-from lic_drake.evaluate.plots import save_figure
 from lic_drake.evaluate.report import RESULTS
+from lic_drake.show.plots import save_figure
 
 
 def main() -> int:

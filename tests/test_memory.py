@@ -24,15 +24,16 @@ from worlds import box, cylinder, make_clutter
 from lic_drake.control.mpc import HapticMpc
 from lic_drake.evaluate.batch import random_requests
 from lic_drake.reach import environment as reach_environment
-from lic_drake.reach import recording, rollout, simulation_pool
+from lic_drake.reach import rollout, simulation_pool
 from lic_drake.reach.diagram import ReachDiagram, make_reach_diagram
 from lic_drake.reach.environment import Environment
 from lic_drake.reach.pointing_starts import pointing_starts
-from lic_drake.reach.recording import ReachRecording
 from lic_drake.reach.request import make_request
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.simulation_pool import SimulationPool
+from lic_drake.show import recording
+from lic_drake.show.recording import ReachRecording
 
 pytestmark = pytest.mark.skipif(
     not Path("/proc/self/statm").exists(), reason="the memory is read from Linux's /proc"

@@ -108,7 +108,7 @@ def test_an_import_takes_less_than_a_blink(what: str) -> None:
         ("lic_drake.experience.workers", {"pydrake", "numpy", "pyarrow", "sklearn"}),
         ("lic_drake.select.lic", {"sklearn", "matplotlib", "distributed"}),
         ("lic_drake.reach.rollout", {"sklearn", "matplotlib", "distributed"}),
-        ("lic_drake.evaluate.embed", {"pydrake", "numpy", "matplotlib"}),
+        ("lic_drake.show.embed", {"pydrake", "numpy", "matplotlib"}),
     ],
 )
 def test_modules_load_only_what_they_need(module: str, heavy: set[str]) -> None:

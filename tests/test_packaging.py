@@ -31,6 +31,7 @@ FLOW = (
     "select",
     "perception",
     "evaluate",
+    "show",
     "cli",
 )
 """Rooms from left to right; a module imports only from its own room and from rooms to its left."""

@@ -12,7 +12,7 @@ from lic_drake.cli.arguments import (
 )
 
 if TYPE_CHECKING:
-    from lic_drake.robots.pr2_meshes import LinkMesh
+    from lic_drake.show.pr2_meshes import LinkMesh
 
 
 class _Demonstration(NamedTuple):
@@ -97,12 +97,12 @@ def add_parser(subparsers: Subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Runs the subcommand and returns the exit code."""
     from lic_drake.errors import LicError
-    from lic_drake.evaluate.demonstration import demonstrate
     from lic_drake.experience.schema import scenario_text
     from lic_drake.experience.store import ExperienceLibrary
     from lic_drake.paths import shipped_library
     from lic_drake.perception.config import load_cameras
     from lic_drake.reach.scenario import load_scenario, parse_scenario
+    from lic_drake.show.demonstration import demonstrate
 
     category = args.category or _USUAL[args.robot]
     usual = _DEMONSTRATIONS[category]
@@ -127,8 +127,8 @@ def run(args: argparse.Namespace) -> int:
 def _find_meshes(robot: str) -> list["LinkMesh"]:
     """Returns Drake's meshes of the PR2; none, with a line that says why, if they cannot be had."""
     from lic_drake.errors import LicError, ModelError
-    from lic_drake.robots.drake_models import find_drake_models
-    from lic_drake.robots.pr2_meshes import read_pr2_meshes
+    from lic_drake.show.drake_models import find_drake_models
+    from lic_drake.show.pr2_meshes import read_pr2_meshes
 
     if robot != "pr2":
         raise LicError(f"--visuals drake_models is for --robot pr2, not {robot}; leave it out")

@@ -53,12 +53,12 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Runs the subcommand and returns the exit code."""
-    from lic_drake.evaluate.exhibits import choose_exhibits
-    from lic_drake.evaluate.gallery_page import make_page, numbers_of
     from lic_drake.experience.files import check_writable, write_atomically
     from lic_drake.experience.store import ExperienceLibrary
     from lic_drake.paths import shipped_libraries
     from lic_drake.select.registry import check_method
+    from lic_drake.show.exhibits import choose_exhibits
+    from lic_drake.show.gallery_page import make_page, numbers_of
 
     check_method(args.method)
     check_writable(args.out)

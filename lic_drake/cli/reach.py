@@ -143,7 +143,7 @@ def _to_json(record: "ReachRecord") -> str:
 
 def _draw(request: "ReachRequest", path: Path) -> None:
     from lic_drake.reach.diagram import make_reach_diagram
-    from lic_drake.reach.diagram_drawing import draw_diagram
+    from lic_drake.show.diagram_drawing import draw_diagram
 
     instance = request.scenario.sample_instance(request.stream, request.environment)
     draw_diagram(make_reach_diagram(request.scenario, instance).diagram, path)
@@ -152,8 +152,8 @@ def _draw(request: "ReachRequest", path: Path) -> None:
 def _record(request: "ReachRequest", path: Path) -> None:
     import numpy as np
 
-    from lic_drake.reach.recording import ReachRecording
     from lic_drake.reach.rollout import instance_of, simulate_request
+    from lic_drake.show.recording import ReachRecording
 
     recording = ReachRecording(request.scenario, instance_of(request), request.torso)
     recording.add_reach(simulate_request(request, keep_states=True).trace, np.array(request.goal))

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lic_drake.errors import LibraryError, LicError
-from lic_drake.evaluate.looking import Watch
 from lic_drake.evaluate.trial import Attempt, run_trial
 from lic_drake.evaluate.trials import TrialRow, read_trials, write_trials
 from lic_drake.experience.added import added_columns
@@ -21,6 +20,7 @@ from lic_drake.experience.schema import scenario_text
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.experience.workers import prepare_worker
 from lic_drake.perception.config import load_cameras
+from lic_drake.perception.looking import Watch
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario, load_scenario, parse_scenario

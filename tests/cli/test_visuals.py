@@ -7,8 +7,8 @@ import pytest
 from mesh_package import go_offline, write_drake_models
 
 from lic_drake.cli.main import main
-from lic_drake.evaluate import demonstration
-from lic_drake.evaluate.demonstration import Demonstration
+from lic_drake.show import demonstration
+from lic_drake.show.demonstration import Demonstration
 
 
 @pytest.fixture

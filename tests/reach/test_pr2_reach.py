@@ -16,12 +16,12 @@ from lic_drake.reach import rollout
 from lic_drake.reach.diagram import make_reach_diagram
 from lic_drake.reach.environment import Environment, simulate
 from lic_drake.reach.pointing_starts import pointing_starts, standing_at
-from lic_drake.reach.recording import ReachRecording
 from lic_drake.reach.request import make_request, request_of
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.simulation import Simulation
 from lic_drake.reach.trace import ReachResult
+from lic_drake.show.recording import ReachRecording
 
 PRECISE = load_scenario("sphere-aperture-clutter", "{stop: {success_distance_m: 0.01}}")
 FREE = Environment(PRECISE, spheres())

@@ -1,0 +1,1 @@
+"""Pictures of reaches: recordings (Meshcat), stills (rendered), figures (matplotlib) and films."""

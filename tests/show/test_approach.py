@@ -1,0 +1,39 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from pr2_reaches import SCENARIO
+
+from lic_drake.reach.pointing_starts import mobile_positions, pointing_starts
+from lic_drake.show.approach import RETREAT_STEP_M, WAITING_DEG, plan_approach
+
+INSTANCE = SCENARIO.sample_instance("training", 0)
+STARTS = pointing_starts(SCENARIO, INSTANCE)
+
+
+# At the last one the arm's limits allow no straight way.
+@pytest.mark.parametrize(("index", "straight"), [(0, True), (16, True), (9, False)])
+def test_the_arm_comes_straight_in_and_touches_nothing(index: int, straight: bool) -> None:
+    b0, q_start = STARTS.grid.b0[index], STARTS.grid_angles[index]
+    path = plan_approach(STARTS.checker, b0, q_start)
+    assert path is not None
+    np.testing.assert_allclose(path[[0, -1]], [np.deg2rad(WAITING_DEG), q_start])
+    arm = SCENARIO.arm(float(b0[2]))
+    assert np.all((path >= arm.q_min) & (path <= arm.q_max))
+    for a, b in pairwise(path):
+        for q in np.linspace(a, b, 1 + int(np.ceil(np.abs(b - a).max() / 0.02))):
+            assert not STARTS.checker.touches(mobile_positions(b0, q[None])[0])
+    if straight:  # The last centimetres at least, and the tool does not turn.
+        R_RE, way = arm.tip_rotation(q_start), 3 * RETREAT_STEP_M
+        p_RE = [arm.tip_position(q) for q in path[[-4, -1]]]
+        np.testing.assert_allclose(p_RE[1] - p_RE[0], way * R_RE[:, 0], atol=1e-3)
+        np.testing.assert_allclose(arm.tip_rotation(path[-4]), R_RE, atol=1e-3)
+
+
+def test_base_and_torso_may_go_anywhere_while_the_arm_waits() -> None:
+    stand = SCENARIO.task.stand
+    assert stand is not None
+    for y_m in np.linspace(stand.y_min_m, stand.y_max_m, 7):
+        for torso_m in np.linspace(stand.torso_min_m, stand.torso_max_m, 4):
+            q = mobile_positions(np.array([0.0, y_m, torso_m]), np.deg2rad(WAITING_DEG)[None])[0]
+            assert not STARTS.checker.touches(q)

@@ -1,0 +1,60 @@
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+from matplotlib.patches import Ellipse, Polygon
+from ray_casting import blank, tilted
+
+from lic_drake.perception.apertures import DetectedApertures
+from lic_drake.perception.goal import DetectedGoal
+from lic_drake.show.drawing import (
+    STATE_COLORS,
+    draw_apertures,
+    draw_goal,
+    draw_passable_probability,
+)
+
+IMAGE = blank(tilted(0.0), np.array([0.0, 0.0, 1.0]))
+CENTRES = np.array([[1.0, 0.1 * k, 1.0] for k in (-2, 0, 2)])
+CORNERS = CENTRES[:, None] + 0.05 * np.array([[0, -1, -1], [0, 1, -1], [0, 1, 1], [0, -1, 1]])
+FOUND = DetectedApertures(
+    p_WA=CENTRES,
+    covariance=np.zeros((3, 3, 3)),
+    corners=CORNERS,
+    covered=np.array([0.0, 0.5, 1.0]),
+    seen=np.ones(3),
+    probability_open=np.array([1.0, 0.25, 0.0]),
+)
+
+
+def test_apertures_are_outlined_in_the_colour_of_their_state() -> None:
+    ax = draw_apertures(Figure().subplots(), IMAGE, FOUND)
+    outlines = [patch for patch in ax.patches if isinstance(patch, Polygon)]
+    for patch, corners, state in zip(outlines, CORNERS, FOUND.states, strict=True):
+        np.testing.assert_allclose(patch.get_xy()[:4], IMAGE.project(corners))
+        assert patch.get_edgecolor() == to_rgba(STATE_COLORS[state])
+    assert [text.get_text() for text in ax.texts] == ["1.00", "0.25", "0.00"]
+
+
+def test_the_whiter_an_aperture_the_more_passable_it_is() -> None:
+    probability = np.array([0.9, 0.2, np.nan])
+    ax = draw_passable_probability(Figure().subplots(), IMAGE, FOUND, probability)
+    shades = [p.get_facecolor()[0] for p in ax.patches if isinstance(p, Polygon)]
+    np.testing.assert_allclose(shades, [0.9, 0.2, 0.0], atol=0.01)
+    assert [text.get_text() for text in ax.texts] == ["0.90", "0.20"]
+    with pytest.raises(ValueError, match=r"probability has shape \(2,\), not \(3,\)"):
+        draw_passable_probability(Figure().subplots(), IMAGE, FOUND, np.ones(2))
+
+
+def test_a_goal_is_drawn_as_the_ball_and_two_standard_deviations() -> None:
+    # 1 cm along the image's x, that is along -Wy, and 2 cm along its y.
+    covariance = np.diag([0.0, 0.01**2, 0.02**2])
+    goal = DetectedGoal(p_WG=np.array([1.5, 0.3, 1.2]), covariance=covariance, num_pixels=100)
+    ax = draw_goal(Figure().subplots(), IMAGE, goal, 0.03)
+    ball, ellipse = (patch for patch in ax.patches if isinstance(patch, Ellipse))
+    scale = IMAGE.focal_px / 1.5
+    np.testing.assert_allclose(ball.get_center(), IMAGE.project(goal.p_WG[None])[0])
+    assert ball.get_width() == pytest.approx(0.06 * scale)
+    assert sorted([ellipse.get_width(), ellipse.get_height()]) == pytest.approx(
+        [0.04 * scale, 0.08 * scale]
+    )
