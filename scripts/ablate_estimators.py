@@ -30,8 +30,8 @@ from lic_drake.experience.second_reach import pair_reaches
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.robots.registry import get_robot
 from lic_drake.select.baselines import corridor_cost
+from lic_drake.types import Vector
 
-Vector = NDArray[np.float64]
 Columns = dict[str, NDArray[Any]]
 
 SHARPNESS = 20.0

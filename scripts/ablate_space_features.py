@@ -32,8 +32,8 @@ from lic_drake.evaluate.table import Table
 from lic_drake.experience.second_reach import FIRST_PREFIX, SHOWN, pair_reaches
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
+from lic_drake.types import Vector
 
-Vector = NDArray[np.float64]
 Columns = dict[str, NDArray[Any]]
 
 ESTIMATORS = ("gp", "knn")

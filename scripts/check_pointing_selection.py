@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.errors import LicError, RequestError
 from lic_drake.estimate.categories import features_of
@@ -32,8 +31,7 @@ from lic_drake.select.objective import SuccessModel, SuccessObjective
 from lic_drake.select.pointing_lic import PointingLbfgsb, PointingLic, is_apart
 from lic_drake.select.registry import fit_model
 from lic_drake.select.situation import FailedReach, Selection, Situation
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 OPTIMISERS = {"MathematicalProgram": PointingLic, "L-BFGS-B": PointingLbfgsb}
 

@@ -1,13 +1,11 @@
 """Success surfaces with known shapes, in the place of fitted estimators."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.estimate.estimator import Prediction
 from lic_drake.estimate.features import PLANAR_LIC1, FeatureMap
 from lic_drake.select.objective import SuccessModel
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 
 class Bumps:

@@ -1,6 +1,7 @@
 """The package as a whole: light to import, without cycles, every public name documented."""
 
 import ast
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -153,3 +154,18 @@ def test_a_name_without_a_word_is_found() -> None:
     text = '"""A module."""\nA = 1\n"""One."""\nB = 2\ndef f(): ...\n'
     text += 'class C:\n    """C."""\n    def g(self): ...\n'
     assert list(undocumented(ast.parse(text))) == ["B", "f", "C.g"]
+
+
+def test_nothing_that_is_read_can_be_executed_or_unpickled() -> None:
+    forbidden = re.compile(
+        r"\b(eval|exec|__import__|unsafe_load|yaml\.load|full_load)\(|allow_pickle"
+        r"|^\s*(?:import|from) (?:pickle|marshal|shelve|joblib|cloudpickle)\b",
+        re.MULTILINE,
+    )
+    found = {
+        path.relative_to(PACKAGE).as_posix()
+        for path in PACKAGE.rglob("*.py")
+        if forbidden.search(path.read_text(encoding="utf-8"))
+    }
+    # Messages between the collector and its own workers, no files.
+    assert found <= {"experience/cluster.py"}

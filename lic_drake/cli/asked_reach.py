@@ -3,15 +3,13 @@
 import argparse
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import RequestError
 from lic_drake.reach.pointing_starts import PointingStarts, pointing_starts
 from lic_drake.reach.request import ReachRequest, check_goal, make_request
 from lic_drake.reach.scenario import Scenario
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 
 def asked_reach(scenario: Scenario, args: argparse.Namespace) -> ReachRequest:

@@ -3,12 +3,12 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.clutter.cylinder import CylinderClutter
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.clutter.placement import place_discs
 from lic_drake.errors import ScenarioError
+from lic_drake.types import Vector
 
 MAX_APERTURES = 50
 """A barrier with more openings is refused."""
@@ -89,7 +89,7 @@ class CylinderApertureClutter(CylinderClutter):
             p_WA=np.column_stack([centres, np.zeros(len(centres))]),
         )
 
-    def _walls(self, y: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _walls(self, y: Vector) -> tuple[Vector, Vector]:
         """Returns positions and sizes of the barrier's parts, each (k + 1, 3), metres.
 
         Args:

@@ -3,10 +3,10 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import ScenarioError
+from lic_drake.types import Vector
 
 MAX_APERTURES = 20
 """A board with more rows or columns is refused."""
@@ -60,7 +60,7 @@ class ApertureBoard:
         """Where the board ends along Wx, metres."""
         return self.board_centre[0] + 0.5 * self.bar_m
 
-    def aperture_centres(self) -> NDArray[np.float64]:
+    def aperture_centres(self) -> Vector:
         """Returns the centres of all apertures, shape (rows * columns, 3); y varies fastest."""
         y = self.aperture_m * (np.arange(self.columns) - 0.5 * (self.columns - 1))
         z = self.aperture_m * (np.arange(self.rows) - 0.5 * (self.rows - 1))
@@ -82,7 +82,7 @@ class ApertureBoard:
             p_WA=self.aperture_centres(),
         )
 
-    def bar_boxes(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def bar_boxes(self) -> tuple[Vector, Vector]:
         """Returns centres and edges of the bars, each shape (k, 3), metres."""
         a, b = self.aperture_m, self.bar_m
         width, height = self.columns * a, self.rows * a

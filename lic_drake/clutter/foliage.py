@@ -10,8 +10,7 @@ from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.clutter.placement import MAX_TRIES, place_discs
 from lic_drake.clutter.stems import Stems
 from lic_drake.errors import ScenarioError
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 MAX_STEMS = 300
 """More stems are refused."""

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lic_drake.clutter.stems import Stems
+from lic_drake.types import Vector
 
 SHAPES = ("cylinder", "box", "sphere")
 """Shape names: an upright cylinder (radius, length), a box (full edges), a sphere (radius)."""
@@ -34,13 +35,13 @@ class ClutterInstance:
 
     category: str
     shape: tuple[str, ...]
-    size: NDArray[np.float64]
-    p_WO: NDArray[np.float64]
-    yaw: NDArray[np.float64]
-    mass: NDArray[np.float64]
+    size: Vector
+    p_WO: Vector
+    yaw: Vector
+    mass: Vector
     movable: NDArray[np.bool_]
-    p_WG: NDArray[np.float64] | None = None
-    p_WA: NDArray[np.float64] | None = None
+    p_WG: Vector | None = None
+    p_WA: Vector | None = None
     stems: Stems | None = None
     material: tuple[str, ...] | None = None
 
@@ -79,7 +80,7 @@ class ClutterInstance:
         """
         return 3 if "sphere" in self.shape else 2
 
-    def translated(self, offset: NDArray[np.float64]) -> "ClutterInstance":
+    def translated(self, offset: Vector) -> "ClutterInstance":
         """Returns the same environment moved by an offset, shape (3,), metres."""
         return replace(
             self,
@@ -102,7 +103,7 @@ class ClutterInstance:
             material=None if self.material is None else tuple(self.material[i] for i in indices),
         )
 
-    def with_objects_at(self, p_WO: NDArray[np.float64]) -> "ClutterInstance":
+    def with_objects_at(self, p_WO: Vector) -> "ClutterInstance":
         """Returns the environment with its movable objects elsewhere.
 
         Stems are as before: they spring back as soon as nothing holds them.

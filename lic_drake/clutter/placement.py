@@ -1,9 +1,9 @@
 """Uniform placement of discs in a rectangle, or of balls in a box, without overlap."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.errors import ScenarioError
+from lic_drake.types import Vector
 
 MAX_TRIES = 10_000
 """Draws for a single disc before the rectangle counts as full."""
@@ -12,10 +12,10 @@ MAX_TRIES = 10_000
 def place_discs(
     rng: np.random.Generator,
     count: int,
-    lower: NDArray[np.float64],
-    upper: NDArray[np.float64],
+    lower: Vector,
+    upper: Vector,
     min_distance: float,
-) -> NDArray[np.float64]:
+) -> Vector:
     """Draws disc centres one after the other, rejecting those too close to earlier ones.
 
     The rule of the authors' generator (gt-ros-pkg/hrl-haptic-manip, obstacles.py): uniform centres,

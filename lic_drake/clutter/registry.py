@@ -12,8 +12,7 @@ from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.clutter.passage import PassageClutter
 from lic_drake.clutter.sphere import SphereApertureClutter
 from lic_drake.errors import ScenarioError
-from lic_drake.extensions import load_extensions
-from lic_drake.registration import add_entry
+from lic_drake.registry import Registry
 
 
 class ClutterSampler(Protocol):
@@ -24,7 +23,7 @@ class ClutterSampler(Protocol):
         ...
 
 
-_CATEGORIES: dict[str, type[ClutterSampler]] = {}
+_CATEGORIES: Registry[type[ClutterSampler]] = Registry("category", ScenarioError)
 
 
 def register_category(name: str, sampler: type[ClutterSampler]) -> None:
@@ -62,7 +61,7 @@ def register_category(name: str, sampler: type[ClutterSampler]) -> None:
                 f"the parameter {item.name!r} of category {name!r} has a type in quotes; leave out"
                 " `from __future__ import annotations`, which scenario files cannot be read with"
             )
-    add_entry(_CATEGORIES, "category", name, sampler, ScenarioError)
+    _CATEGORIES.register(name, sampler)
 
 
 def get_category(name: str) -> type[ClutterSampler]:
@@ -71,16 +70,12 @@ def get_category(name: str) -> type[ClutterSampler]:
     Raises:
         ScenarioError: The category is unknown.
     """
-    load_extensions()
-    if name not in _CATEGORIES:
-        raise ScenarioError(f"unknown category {name!r}; choose one of {', '.join(_CATEGORIES)}")
-    return _CATEGORIES[name]
+    return _CATEGORIES.get(name)
 
 
 def category_names() -> tuple[str, ...]:
     """Returns the names of all known categories."""
-    load_extensions()
-    return tuple(_CATEGORIES)
+    return _CATEGORIES.names()
 
 
 register_category("cylinder-clutter", CylinderClutter)

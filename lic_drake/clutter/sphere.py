@@ -3,12 +3,12 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.clutter.board import ApertureBoard
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.clutter.placement import place_discs
 from lic_drake.errors import ScenarioError
+from lic_drake.types import Vector
 
 MAX_SPHERES = 1000
 """More spheres are refused: the simulation would not finish in useful time."""
@@ -76,7 +76,7 @@ class SphereApertureClutter(ApertureBoard):
             p_WA=np.delete(p_WA, blocked, axis=0),
         )
 
-    def _board(self, p_WA: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _board(self, p_WA: Vector) -> tuple[Vector, Vector]:
         """Returns centres and edges of the board's boxes, each shape (k, 3), metres.
 
         Args:

@@ -15,13 +15,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg.lapack import dposv
 
 from lic_drake.control.mpc_config import MpcConfig
 from lic_drake.control.quadratic_program import QuadraticProgram, solve
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 
 class MpcInput(NamedTuple):

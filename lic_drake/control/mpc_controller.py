@@ -1,7 +1,6 @@
 """`HapticMpcController`: the model predictive controller as a Drake system."""
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from lic_drake.control.mpc import HapticMpc, MpcInput
@@ -9,6 +8,7 @@ from lic_drake.control.mpc_config import MpcConfig
 from lic_drake.control.taxels import TaxelLayout
 from lic_drake.control.torso import RaisableArm
 from lic_drake.robots.arm import Arm
+from lic_drake.types import Vector
 
 
 class HapticMpcController(LeafSystem):
@@ -38,7 +38,7 @@ class HapticMpcController(LeafSystem):
         self.DeclareStateOutputPort("desired_state", desired)
         self.DeclarePeriodicDiscreteUpdateEvent(config.period_s, 0.0, self._update)
 
-    def set_equilibrium(self, context: Context, q_d: NDArray[np.float64]) -> None:
+    def set_equilibrium(self, context: Context, q_d: Vector) -> None:
         """Sets the equilibrium angles, shape (m,), radians, in a context of this system."""
         context.SetDiscreteState(self._desired, np.append(q_d, np.zeros(self._num_joints)))
 

@@ -11,9 +11,8 @@ from typing import NamedTuple
 
 import daqp
 import numpy as np
-from numpy.typing import NDArray
 
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 PRIMAL_TOLERANCE = 1e-10
 """How far a limit may be missed, in the rows' units over their length."""

@@ -6,8 +6,7 @@ from numpy.typing import NDArray
 from lic_drake.control.taxels import TaxelLayout, planar_taxels
 from lic_drake.robots.arm import Arm
 from lic_drake.robots.skin_shape import SkinShape
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 INSIDE_M = 1e-6
 """A taxel this deep inside another shape of its link is covered by it."""

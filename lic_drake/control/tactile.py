@@ -4,9 +4,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.control.taxels import LinkTaxels, TaxelLayout
+from lic_drake.types import Vector
 
 MAX_ANGLE_COS = np.cos(np.deg2rad(45.0))
 """A taxel takes a force only from within 45 degrees of its normal (authors' simulator)."""
@@ -23,17 +23,17 @@ class ContactPatch(NamedTuple):
     """
 
     link: int
-    p_RQ: NDArray[np.float64]
-    n_R: NDArray[np.float64]
-    force: NDArray[np.float64]
+    p_RQ: Vector
+    n_R: Vector
+    force: Vector
 
 
 def calc_taxel_forces(
     layout: TaxelLayout,
-    R_RL: NDArray[np.float64],
-    p_RL: NDArray[np.float64],
+    R_RL: Vector,
+    p_RL: Vector,
     patches: list[ContactPatch],
-) -> NDArray[np.float64]:
+) -> Vector:
     """Returns the normal force on each taxel, shape (num_taxels,), N, compression positive.
 
     A patch on one or two neighbouring taxels loads the single taxel at its centre of pressure, as
@@ -68,9 +68,7 @@ def calc_taxel_forces(
     return forces
 
 
-def _nearest_facing(
-    mine: LinkTaxels, p_LC: NDArray[np.float64], f_L: NDArray[np.float64]
-) -> np.intp:
+def _nearest_facing(mine: LinkTaxels, p_LC: Vector, f_L: Vector) -> np.intp:
     """Returns the taxel nearest to the contact point C among those that face its force."""
     facing = mine.n_L @ f_L >= MAX_ANGLE_COS * math.sqrt(f_L @ f_L)
     distance = mine.compare_distances(p_LC)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lic_drake.robots.arm import SkinCapsule
+from lic_drake.types import Vector
 
 CAP_ANGLES_DEG = (-72.0, -36.0, 0.0, 36.0, 72.0)
 """Directions of the taxels on an end cap, from the capsule's axis (authors' simulator)."""
@@ -24,11 +25,11 @@ class LinkTaxels(NamedTuple):
     """
 
     taxels: NDArray[np.intp]
-    p_LT: NDArray[np.float64]
-    n_L: NDArray[np.float64]
-    half_square: NDArray[np.float64]
+    p_LT: Vector
+    n_L: Vector
+    half_square: Vector
 
-    def compare_distances(self, p_LQ: NDArray[np.float64]) -> NDArray[np.float64]:
+    def compare_distances(self, p_LQ: Vector) -> Vector:
         """Returns what grows with the distance from Q to each taxel, shape (.., n).
 
         That is 1/2 |p_QT|^2 without the 1/2 |p_LQ|^2 that all taxels have in common.
@@ -52,8 +53,8 @@ class TaxelLayout:
 
     pitch_m: float
     link: NDArray[np.intp]
-    p_LT: NDArray[np.float64]
-    n_L: NDArray[np.float64]
+    p_LT: Vector
+    n_L: Vector
 
     @property
     def num_taxels(self) -> int:

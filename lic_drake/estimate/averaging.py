@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lic_drake.estimate.checks import Vector
+from lic_drake.types import Vector
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,8 +8,9 @@ from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
 from lic_drake.estimate.averaging import AveragedRows
-from lic_drake.estimate.checks import Vector, feature_scale
+from lic_drake.estimate.checks import feature_scale
 from lic_drake.seeds import make_generator
+from lic_drake.types import Vector
 
 _MAX_POINTS = 500
 _NEIGHBOURS = 100

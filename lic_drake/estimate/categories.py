@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 
 from lic_drake.estimate.checks import EstimateError
 from lic_drake.estimate.features import PLANAR_LIC1, SPACE_LIC1, FeatureMap
-from lic_drake.extensions import load_extensions
-from lic_drake.registration import add_entry
+from lic_drake.registry import Registry
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,7 +23,7 @@ class CategoryFeatures:
     second: FeatureMap
 
 
-_CATEGORIES: dict[str, CategoryFeatures] = {}
+_CATEGORIES: Registry[CategoryFeatures] = Registry("category with features", EstimateError)
 
 # The paper's x0': in the plane a start is its place on the line and its direction.
 _FIRST_START = ("first_start_y", "first_start_phi")
@@ -45,11 +44,11 @@ def register_features(
         EstimateError: A feature is unknown, or the category has other features already.
     """
     features = CategoryFeatures(first=first, second=replace(first, observed=observed))
-    if _CATEGORIES.get(name, features) != features:
+    if _CATEGORIES.entries.get(name, features) != features:
         raise EstimateError(
             f"the category {name!r} has other features already; choose another name for yours"
         )
-    add_entry(_CATEGORIES, "category", name, features, EstimateError)
+    _CATEGORIES.register(name, features)
 
 
 def features_of(category: str) -> CategoryFeatures:
@@ -58,13 +57,7 @@ def features_of(category: str) -> CategoryFeatures:
     Raises:
         EstimateError: The category is unknown.
     """
-    load_extensions()
-    if category not in _CATEGORIES:
-        raise EstimateError(
-            f"no features are known for the category {category!r}, only for"
-            f" {', '.join(_CATEGORIES)}; call register_features"
-        )
-    return _CATEGORIES[category]
+    return _CATEGORIES.get(category)
 
 
 register_features(

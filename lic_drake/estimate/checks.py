@@ -1,11 +1,10 @@
 """Checks of what is handed to an estimator, with messages that say what to do."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from lic_drake.errors import LicError
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 
 class EstimateError(LicError):

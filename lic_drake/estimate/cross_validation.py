@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lic_drake.estimate.checks import Vector
 from lic_drake.estimate.estimator import Predictor
 from lic_drake.estimate.features import ExperienceRows
 from lic_drake.estimate.folds import environment_folds
+from lic_drake.types import Vector
 
 MIN_PROBABILITY = 1e-3
 """Log losses take probabilities within [1e-3, 1 - 1e-3], for all estimators alike."""

@@ -5,7 +5,7 @@ from typing import Protocol, Self, runtime_checkable
 
 from numpy.typing import ArrayLike
 
-from lic_drake.estimate.checks import Vector
+from lic_drake.types import Vector
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lic_drake.estimate.checks import EstimateError, Vector
+from lic_drake.estimate.checks import EstimateError
 from lic_drake.experience.second_reach import FIRST_PREFIX, SHOWN
+from lic_drake.types import Vector
 
 _GOAL = ("goal_x", "goal_y", "goal_z")
 _IN_PLANE = ("start_x", "start_y", "start_phi")

@@ -9,10 +9,11 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.distance import cdist
 from scipy.special import logsumexp
 
-from lic_drake.estimate.checks import EstimateError, Vector, feature_scale
+from lic_drake.estimate.checks import EstimateError, feature_scale
 from lic_drake.estimate.features import FeatureMap
 from lic_drake.estimate.folds import selection_folds
 from lic_drake.seeds import make_generator
+from lic_drake.types import Vector
 
 OUTLIERS = 0.05
 """Share of failures that end anywhere, in the square metre in front of the robot: no single

@@ -8,18 +8,13 @@ from numpy.typing import ArrayLike, NDArray
 from threadpoolctl import threadpool_limits
 
 from lic_drake.estimate.averaging import AveragedRows, average_rows, reach_variance
-from lic_drake.estimate.checks import (
-    EstimateError,
-    Vector,
-    checked_queries,
-    checked_rows,
-    checked_weights,
-)
+from lic_drake.estimate.checks import EstimateError, checked_queries, checked_rows, checked_weights
 from lic_drake.estimate.estimator import Prediction
 from lic_drake.estimate.folds import selection_folds
 from lic_drake.estimate.likelihood import Hyperparameters, fit_hyperparameters
 from lic_drake.estimate.posterior import Posterior, condition
 from lic_drake.seeds import make_generator
+from lic_drake.types import Vector
 
 _DESIGN_EFFECTS = (1.0, 2.0, 4.0, 8.0, 16.0)
 # A matrix of that many rows takes half a gigabyte. The search for settings inverts hundreds.

@@ -7,7 +7,7 @@ is another model.) It has a kink wherever a feature equals that of a training ro
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from lic_drake.estimate.checks import Vector
+from lic_drake.types import Vector
 
 
 def l1_correlation(A: Vector, B: Vector, theta: Vector) -> Vector:

@@ -12,8 +12,9 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dpotri
 from scipy.optimize import minimize
 
-from lic_drake.estimate.checks import Vector, feature_scale
+from lic_drake.estimate.checks import feature_scale
 from lic_drake.seeds import make_generator
+from lic_drake.types import Vector
 
 # Bounds of theta are per standard deviation of a feature: from nearly a straight line through
 # all rows to rows that tell nothing about each other.

@@ -12,9 +12,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lic_drake.estimate.checks import Vector, checked_queries, checked_rows
+from lic_drake.estimate.checks import checked_queries, checked_rows
 from lic_drake.estimate.estimator import Prediction, UpdatableEstimator
 from lic_drake.estimate.features import FeatureMap
+from lic_drake.types import Vector
 
 _DECIMALS = 9
 """Sums of the same numbers in another order are the same features again, metres."""

@@ -9,16 +9,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from lic_drake.estimate.averaging import average_rows
 from lic_drake.estimate.bandwidth import select_bandwidths
-from lic_drake.estimate.checks import (
-    EstimateError,
-    Vector,
-    checked_queries,
-    checked_rows,
-    checked_weights,
-)
+from lic_drake.estimate.checks import EstimateError, checked_queries, checked_rows, checked_weights
 from lic_drake.estimate.estimator import Prediction, SuccessEstimator
 from lic_drake.estimate.folds import selection_folds
 from lic_drake.seeds import make_generator
+from lic_drake.types import Vector
 
 _CACHE_SIZE = 64
 # In length scales: queries in one cell share a local model, which is that of the cell's centre.

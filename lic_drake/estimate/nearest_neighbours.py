@@ -9,15 +9,10 @@ from scipy.spatial import cKDTree
 
 from lic_drake.estimate.averaging import AveragedRows, average_rows
 from lic_drake.estimate.bandwidth import gaussian_weights, query_neighbours, select_bandwidths
-from lic_drake.estimate.checks import (
-    EstimateError,
-    Vector,
-    checked_queries,
-    checked_rows,
-    checked_weights,
-)
+from lic_drake.estimate.checks import EstimateError, checked_queries, checked_rows, checked_weights
 from lic_drake.estimate.estimator import Prediction
 from lic_drake.estimate.folds import selection_folds
+from lic_drake.types import Vector
 
 
 @dataclass(frozen=True, kw_only=True)

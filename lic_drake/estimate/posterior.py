@@ -6,9 +6,9 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from lic_drake.estimate.averaging import AveragedRows
-from lic_drake.estimate.checks import Vector
 from lic_drake.estimate.kernels import l1_correlation, l1_correlation_with_gradient
 from lic_drake.estimate.likelihood import Hyperparameters
+from lic_drake.types import Vector
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,13 +20,12 @@ from lic_drake.estimate.local import LocalEstimator
 from lic_drake.estimate.local_process import choose_process
 from lic_drake.estimate.nearest_neighbours import NearestNeighbours
 from lic_drake.estimate.stacked import StackedEstimator
-from lic_drake.extensions import load_extensions
-from lic_drake.registration import add_entry
+from lic_drake.registry import Registry
 
 EstimatorFactory = Callable[[FeatureMap], SuccessEstimator]
 """Returns a new, unfitted estimator for what its features mean."""
 
-_ESTIMATORS: dict[str, EstimatorFactory] = {}
+_ESTIMATORS: Registry[EstimatorFactory] = Registry("estimator", EstimateError)
 
 _RESERVED = ("rnd", "cost")
 """Methods of selection without an estimator."""
@@ -48,12 +47,12 @@ def register_estimator(name: str, factory: EstimatorFactory) -> None:
             f" {factory!r}; register the class or a lambda, not the estimator"
         )
     twins = (f"{name}1", name[:-1] if name.endswith("1") else None)
-    if name in _RESERVED or any(twin in _ESTIMATORS for twin in twins):
+    if name in _RESERVED or any(twin in _ESTIMATORS.entries for twin in twins):
         raise EstimateError(
             f"{name!r} cannot be the name of an estimator, as it would mean two methods; choose"
             " another name"
         )
-    add_entry(_ESTIMATORS, "estimator", name, factory, EstimateError)
+    _ESTIMATORS.register(name, factory)
 
 
 def make_estimator(name: str, features: FeatureMap = PLANAR_LIC1) -> SuccessEstimator:
@@ -66,18 +65,12 @@ def make_estimator(name: str, features: FeatureMap = PLANAR_LIC1) -> SuccessEsti
     Raises:
         EstimateError: The estimator is unknown.
     """
-    load_extensions()
-    if name not in _ESTIMATORS:
-        raise EstimateError(
-            f"unknown estimator {name!r}; choose one of {', '.join(estimator_names())}"
-        )
-    return _ESTIMATORS[name](features)
+    return _ESTIMATORS.get(name)(features)
 
 
 def estimator_names() -> tuple[str, ...]:
     """Returns the names of all known estimators, the default first."""
-    load_extensions()
-    return tuple(_ESTIMATORS)
+    return _ESTIMATORS.names()
 
 
 def _process(features: FeatureMap) -> SuccessEstimator:

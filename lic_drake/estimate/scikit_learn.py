@@ -8,14 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lic_drake.estimate.averaging import average_rows, reach_variance
-from lic_drake.estimate.checks import (
-    EstimateError,
-    Vector,
-    checked_queries,
-    checked_rows,
-    feature_scale,
-)
+from lic_drake.estimate.checks import EstimateError, checked_queries, checked_rows, feature_scale
 from lic_drake.estimate.estimator import Prediction, Predictor
+from lic_drake.types import Vector
 
 
 @dataclass(kw_only=True)

@@ -14,15 +14,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lic_drake.estimate.checks import (
-    EstimateError,
-    Vector,
-    checked_queries,
-    checked_rows,
-    checked_weights,
-)
+from lic_drake.estimate.checks import EstimateError, checked_queries, checked_rows, checked_weights
 from lic_drake.estimate.estimator import Prediction, UpdatableEstimator
 from lic_drake.seeds import make_generator
+from lic_drake.types import Vector
 
 MAX_ROWS = 2000
 """So many random rows of D2 tell how an estimate and a failure add up; two features and a few

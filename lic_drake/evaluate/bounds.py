@@ -15,7 +15,6 @@ import numpy as np
 from lic_drake.errors import LibraryError
 from lic_drake.evaluate.factorial import Factorial
 from lic_drake.evaluate.optima import (
-    Vector,
     choose_bandwidth,
     chosen_rate,
     held_out_score,
@@ -27,6 +26,7 @@ from lic_drake.evaluate.optima import (
 )
 from lic_drake.evaluate.table import Table
 from lic_drake.seeds import make_generator
+from lic_drake.types import Vector
 
 RESAMPLES = 2000
 """Bootstrap samples of an interval."""

@@ -24,8 +24,7 @@ from lic_drake.paths import shipped_library
 from lic_drake.select.baselines import corridor_cost
 from lic_drake.select.objective import SuccessModel
 from lic_drake.select.registry import fit_model
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 APERTURES = "cylinder-aperture-clutter"
 """The category whose base moves."""

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from lic_drake.estimate.features import FeatureMap
 from lic_drake.evaluate.bounds import Bound
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 
 @dataclass(frozen=True, kw_only=True)

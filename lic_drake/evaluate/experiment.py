@@ -9,7 +9,6 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.errors import LibraryError, LicError
 from lic_drake.evaluate.trial import Attempt, run_trial
@@ -34,8 +33,7 @@ from lic_drake.select.registry import (
     needs_library,
     split_method,
 )
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 REACHES_A_BLOCK = 60
 """About this many reaches make a unit of work: what an interruption can cost each worker."""

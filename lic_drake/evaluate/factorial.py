@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lic_drake.errors import LibraryError
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 
 @dataclass(frozen=True, kw_only=True)

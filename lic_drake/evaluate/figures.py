@@ -14,8 +14,7 @@ from lic_drake.estimate.cross_validation import CalibrationBin
 from lic_drake.evaluate.learning import LearningPoint
 from lic_drake.evaluate.paper import LABELS, label
 from lic_drake.evaluate.statistics import Count
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 COLORS = {"rnd": "tab:gray", "cost": "tab:orange", "gp": "tab:blue", "knn": "tab:green"}
 """Colours of the strategies; others take the next of matplotlib's cycle."""

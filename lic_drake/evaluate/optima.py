@@ -9,7 +9,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
+
 Successes = NDArray[np.bool_]
 """Array that tells which reaches arrived at their goal."""
 

@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.clutter.board import ApertureBoard
 from lic_drake.clutter.instance import ClutterInstance
@@ -17,8 +16,7 @@ from lic_drake.perception.goal import find_goal
 from lic_drake.perception.views import Views, disturbed, take_views
 from lic_drake.reach.scenario import Scenario
 from lic_drake.seeds import make_generator
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,8 @@ from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.starts import Starts, make_starts
 from lic_drake.select.registry import Selector
-from lic_drake.select.situation import FailedReach, Selection, Situation, Vector
+from lic_drake.select.situation import FailedReach, Selection, Situation
+from lic_drake.types import Vector
 
 
 @dataclass(frozen=True, kw_only=True)

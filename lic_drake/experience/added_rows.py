@@ -15,6 +15,7 @@ from lic_drake.errors import LibraryError, RequestError, quoted
 from lic_drake.reach.request import check_goal
 from lic_drake.reach.scenario import Scenario
 from lic_drake.robots.planar import PlanarArm
+from lic_drake.types import Vector
 
 Columns = dict[str, NDArray[Any]]
 """Arrays of equal length by the names of columns."""
@@ -215,7 +216,7 @@ def _check_planar_start(row: Mapping[str, float], scenario: Scenario, where: str
             )
 
 
-def _numbered(environment: NDArray[np.float64]) -> NDArray[np.int64]:
+def _numbered(environment: Vector) -> NDArray[np.int64]:
     """Returns environments as whole numbers; rows without one get numbers that no other has."""
     unknown = np.isnan(environment)
     first = 0 if np.all(unknown) else int(np.max(environment[~unknown])) + 1

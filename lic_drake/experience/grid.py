@@ -12,7 +12,8 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from lic_drake.errors import LibraryError, RequestError
+from lic_drake.config import read_mapping
+from lic_drake.errors import LibraryError, RequestError, ScenarioError
 from lic_drake.experience.files import readable_errors, write_atomically
 from lic_drake.experience.schema import scenario_text
 from lic_drake.reach.initial_conditions import InitialConditions
@@ -20,7 +21,7 @@ from lic_drake.reach.request import ReachRequest, make_request
 from lic_drake.reach.scenario import Scenario, parse_scenario
 from lic_drake.reach.starts import training_starts
 from lic_drake.seeds import STREAMS
-from lic_drake.yaml_text import parse_yaml
+from lic_drake.types import Vector
 
 REQUEST_FILE = "_collection.yaml"
 """Name of the request's file in a library; the underscore hides it from Parquet readers."""
@@ -73,7 +74,7 @@ class CollectionRequest:
         """Indices of the environments in their stream."""
         return range(self.first_environment, self.first_environment + self.environments)
 
-    def goals(self, environment: int | None = None) -> NDArray[np.float64]:
+    def goals(self, environment: int | None = None) -> Vector:
         """Returns the goals p_WG in an environment, shape (n, 3), metres; n is the same in all.
 
         Args:
@@ -166,10 +167,10 @@ def read_request(path: Path) -> CollectionRequest:
     with readable_errors(path, "read"):
         content = path.read_bytes()
     try:
-        data = parse_yaml(content)
-    except ValueError:
-        data = None
-    if not isinstance(data, dict) or not _is_request(data):
+        data = read_mapping(content, str(path))
+    except ScenarioError:
+        data = {}
+    if not _is_request(data):
         raise LibraryError(
             f"{path} is not a collection request; restore it, or delete it and run lic collect"
             " with the library's options"

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates, uniform_filter
 from scipy.special import ndtr
 
@@ -13,8 +12,7 @@ from lic_drake.perception.board_plane import BoardPlane, find_board_plane
 from lic_drake.perception.config import CameraConfig
 from lic_drake.perception.image import CameraImage
 from lic_drake.perception.noise import pose_covariance
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 STATES = ("open", "partly", "blocked", "unseen")
 """What an aperture can be found to be."""

@@ -12,8 +12,7 @@ from lic_drake.perception.apertures import BoardModel, DetectedApertures
 from lic_drake.perception.lookout import Look
 from lic_drake.reach.pointing_starts import PointingStarts, pointing_starts
 from lic_drake.reach.scenario import Scenario
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 LEAST_PROBABILITY = 0.5
 """An aperture that is less likely open is taken for blocked."""

@@ -4,13 +4,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.signal import correlate
 
 from lic_drake.errors import PerceptionError
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 FIRST_BAR_SHARE = 0.1
 """Width of the bars, as a share of the apertures', that the search begins with."""

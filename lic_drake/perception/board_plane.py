@@ -3,14 +3,12 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from skimage.color import rgb2hsv
 
 from lic_drake.errors import PerceptionError
 from lic_drake.perception.config import CameraConfig
 from lic_drake.perception.image import CameraImage
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 WOOD_HUE = (0.04, 0.13)
 """Range of hues of the bars, 0 to 1."""

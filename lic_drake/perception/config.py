@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
+from lic_drake.config import read_mapping, read_section
 from lic_drake.errors import ScenarioError
 from lic_drake.paths import models_dir
-from lic_drake.reach.scenario import read_section
 
 MAX_PIXELS = 4096
 """An image with more columns or rows is refused."""
@@ -149,5 +149,5 @@ def load_cameras(name_or_path: str | Path = "foliage") -> CamerasConfig:
         raise ScenarioError(
             f"no cameras {str(name_or_path)!r}; shipped cameras: {known}, or give a .yaml path"
         ) from None
-    cameras: CamerasConfig = read_section(CamerasConfig, text, str(name_or_path))
-    return cameras
+    source = str(name_or_path)
+    return read_section(CamerasConfig, read_mapping(text, source), source)

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from skimage.color import rgb2hsv
 from skimage.measure import label, regionprops
@@ -12,8 +11,7 @@ from lic_drake.errors import PerceptionError
 from lic_drake.perception.config import CameraConfig
 from lic_drake.perception.image import CameraImage
 from lic_drake.perception.noise import pose_covariance
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 YELLOW_HUE = (0.105, 0.19)
 """Range of hues of the ball, 0 to 1."""

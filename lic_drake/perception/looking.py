@@ -4,7 +4,6 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.perception.belief import Belief, believe, board_of
 from lic_drake.perception.config import CamerasConfig
@@ -13,8 +12,7 @@ from lic_drake.reach.request import ReachRecord
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.starts import Starts
 from lic_drake.seeds import make_generator
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 
 @dataclass(kw_only=True)

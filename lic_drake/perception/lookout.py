@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.sensors import RgbdSensor
 
@@ -21,8 +20,7 @@ from lic_drake.perception.systems import (
     make_goal_detector,
 )
 from lic_drake.perception.views import Views, add_rig
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 NUM_CAMERAS = 2
 """The head's and the external one."""

@@ -14,8 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from lic_drake.perception.config import CameraConfig, NoiseConfig, PoseErrorConfig
 from lic_drake.perception.image import CameraImage
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 _FAR_M = 1e6
 

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.geometry import (
     Box,
     ClippingRange,
@@ -35,8 +34,7 @@ from lic_drake.perception.rendering import make_renderer
 from lic_drake.perception.systems import camera_image
 from lic_drake.robots.pr2_head import HEAD_CAMERA, RIGHT_ARM_AT_REST, LookingPr2
 from lic_drake.scene.scene import Scene, SceneConfig, add_scene
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 BALL_COLOR = np.array([0.95, 0.80, 0.05, 1.0])
 """Of the goal, RGBA."""

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.geometry import Meshcat, MeshcatVisualizer, MeshcatVisualizerParams, Role
 from pydrake.multibody.meshcat import ContactVisualizer, ContactVisualizerParams
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
@@ -16,6 +15,7 @@ from lic_drake.control.tactile_sensor import TactileSensor
 from lic_drake.reach.scenario import Scenario
 from lic_drake.scene.furnish import raise_torso
 from lic_drake.scene.scene import Scene, add_scene
+from lic_drake.types import Vector
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,9 +34,7 @@ class ReachDiagram:
     torso_frame: str
     visualizer: MeshcatVisualizer | None
 
-    def set_start(
-        self, context: Context, q: NDArray[np.float64], p_WG: NDArray[np.float64]
-    ) -> None:
+    def set_start(self, context: Context, q: Vector, p_WG: Vector) -> None:
         """Puts the arm at rest at q, with the goal p_WG, in a context of the diagram."""
         plant = self.scene.plant
         x = np.append(q, np.zeros(len(q)))

@@ -4,7 +4,6 @@ import math
 from contextlib import suppress
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.reach.diagram import make_reach_diagram
@@ -18,8 +17,7 @@ from lic_drake.reach.trace import ReachResult, ReachTrace
 from lic_drake.reach.waking import PartlyAsleep, WakingSimulation
 from lic_drake.robots.arm import Arm
 from lic_drake.scene.sleep import MovedTooFarError, can_sleep
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 
 class Environment:

@@ -4,12 +4,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.reach.task import StartLine
 from lic_drake.robots.arm import Arm
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,7 +6,6 @@ from functools import cached_property, lru_cache
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.clutter.board import ApertureBoard
 from lic_drake.clutter.instance import ClutterInstance
@@ -22,8 +21,7 @@ from lic_drake.robots.pr2_inverse import (
 )
 from lic_drake.scene.collision import CollisionChecker
 from lic_drake.scene.scene import SceneConfig
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 STEP_M = (0.1, 0.05)
 """Distances of neighbouring places of the base and heights of the torso in the grid, metres."""

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.errors import RequestError
 from lic_drake.reach.scenario import Scenario
 from lic_drake.robots.arm import Arm
+from lic_drake.types import Vector
 
 OUTCOMES = ("reached", "stuck", "force", "timeout", "diverged", "invalid_start", "unreachable")
 """How a reach can end: at the goal; without progress; by the force stop; out of time; by a
@@ -82,7 +82,7 @@ class ReachRequest:
         return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
 
     @property
-    def p_WR(self) -> NDArray[np.float64]:
+    def p_WR(self) -> Vector:
         """Position of the base, shape (3,), metres."""
         return np.array([*self.base, 0.0])
 
@@ -95,9 +95,7 @@ class ReachRequest:
             self, start=last.start, base=last.base, torso=last.torso, after=self.after[:-1]
         )
 
-    def then(
-        self, x0: NDArray[np.float64], p_WR: NDArray[np.float64], torso_m: float | None = None
-    ) -> "ReachRequest":
+    def then(self, x0: Vector, p_WR: Vector, torso_m: float | None = None) -> "ReachRequest":
         """Returns the request of a further reach to the same goal.
 
         Args:
@@ -119,9 +117,9 @@ def make_request(
     scenario: Scenario,
     stream: str,
     environment: int,
-    p_WG: NDArray[np.float64],
-    x0: NDArray[np.float64],
-    p_WR: NDArray[np.float64] | None = None,
+    p_WG: Vector,
+    x0: Vector,
+    p_WR: Vector | None = None,
     torso_m: float | None = None,
 ) -> ReachRequest:
     """Returns the request of a first reach from arrays.
@@ -154,15 +152,15 @@ def make_request(
     )
 
 
-def _numbers(values: NDArray[np.float64]) -> tuple[float, ...]:
+def _numbers(values: Vector) -> tuple[float, ...]:
     return tuple(np.asarray(values, dtype=float).tolist())
 
 
-def _triple(values: NDArray[np.float64]) -> tuple[float, float, float]:
+def _triple(values: Vector) -> tuple[float, float, float]:
     return float(values[0]), float(values[1]), float(values[2])
 
 
-def _pair(values: NDArray[np.float64]) -> tuple[float, float]:
+def _pair(values: Vector) -> tuple[float, float]:
     # Adding zero makes -0.0 and 0.0 the same base with the same key.
     return float(values[0]) + 0.0, float(values[1]) + 0.0
 
@@ -249,12 +247,12 @@ class ReachRecord:
         return quaternion != (0.0, 0.0, 0.0, 0.0)
 
     @property
-    def p_WG(self) -> NDArray[np.float64]:
+    def p_WG(self) -> Vector:
         """The goal, shape (3,), metres."""
         return np.array([self.goal_x, self.goal_y, self.goal_z])
 
     @property
-    def x0(self) -> NDArray[np.float64]:
+    def x0(self) -> Vector:
         """The start pose: (x, y, phi), or position and quaternion in space, as in the request."""
         if not self.in_space:
             return np.array([self.start_x, self.start_y, self.start_phi])
@@ -279,7 +277,7 @@ def request_of(record: ReachRecord, scenario: Scenario) -> ReachRequest:
     )
 
 
-def check_goal(scenario: Scenario, p_RG: NDArray[np.float64], torso_m: float | None = None) -> None:
+def check_goal(scenario: Scenario, p_RG: Vector, torso_m: float | None = None) -> None:
     """Refuses goals that no reach could come to.
 
     Args:
@@ -303,9 +301,7 @@ def check_goal(scenario: Scenario, p_RG: NDArray[np.float64], torso_m: float | N
         )
 
 
-def is_within_reach(
-    scenario: Scenario, p_RG: NDArray[np.float64], torso_m: float | None = None
-) -> bool:
+def is_within_reach(scenario: Scenario, p_RG: Vector, torso_m: float | None = None) -> bool:
     """Tells whether the straight arm could come near enough to a goal to succeed.
 
     Args:

@@ -7,7 +7,6 @@ from functools import cache
 from importlib.metadata import version
 
 import numpy as np
-from numpy.typing import NDArray
 
 import lic_drake
 from lic_drake.clutter.instance import ClutterInstance
@@ -15,8 +14,7 @@ from lic_drake.reach.environment import Environment
 from lic_drake.reach.request import IN_SPACE, ReachRecord, ReachRequest
 from lic_drake.reach.simulation_pool import SimulationPool
 from lic_drake.reach.trace import ReachResult
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 MAX_ENVIRONMENTS = 8
 """Environments, with their bases and histories, whose diagrams a process keeps at a time."""

@@ -11,12 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
-from numpy.typing import NDArray
-from pydrake.common.yaml import yaml_load_typed
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.clutter.registry import ClutterSampler, get_category
+from lic_drake.config import merge, read_mapping, read_section
 from lic_drake.control.mpc_config import PRESETS, MpcConfig
 from lic_drake.errors import RequestError, ScenarioError
 from lic_drake.paths import scenarios_dir
@@ -26,9 +24,7 @@ from lic_drake.robots.arm import Arm
 from lic_drake.robots.registry import get_robot
 from lic_drake.scene.scene import SceneConfig
 from lic_drake.seeds import make_generator
-from lic_drake.yaml_text import parse_yaml
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 
 @dataclass(kw_only=True)
@@ -145,7 +141,7 @@ def load_scenario(name_or_path: str | Path, overrides: str = "") -> Scenario:
 
 def parse_scenario(content: str, overrides: str = "", source: str = "scenario") -> Scenario:
     """Builds a scenario from YAML text; see `load_scenario`."""
-    data = _merge(_mapping(content, source), _mapping(overrides, "overrides"))
+    data = merge(read_mapping(content, source), read_mapping(overrides, "overrides"))
     sections = {"category", "robot", "clutter", "task", "scene", "mpc", "stop"}
     unknown = set(data) - sections
     if unknown:
@@ -169,11 +165,11 @@ def parse_scenario(content: str, overrides: str = "", source: str = "scenario") 
     scenario = Scenario(
         category=data["category"],
         robot=data["robot"],
-        clutter=_typed(sampler, data.get("clutter"), f"{source}: clutter"),
-        task=_typed(Task, data.get("task"), f"{source}: task"),
-        scene=_typed(SceneConfig, data.get("scene"), f"{source}: scene"),
-        mpc=_typed(MpcConfig, mpc, f"{source}: mpc", defaults=PRESETS[preset]()),
-        stop=_typed(StopConfig, data.get("stop"), f"{source}: stop"),
+        clutter=read_section(sampler, data.get("clutter"), f"{source}: clutter"),
+        task=read_section(Task, data.get("task"), f"{source}: task"),
+        scene=read_section(SceneConfig, data.get("scene"), f"{source}: scene"),
+        mpc=read_section(MpcConfig, mpc, f"{source}: mpc", defaults=PRESETS[preset]()),
+        stop=read_section(StopConfig, data.get("stop"), f"{source}: stop"),
     )
     scenario.arm()  # Refuses a torso out of its range.
     if scenario.task.goal_area is None and len(scenario.goals("training", 0)) == 0:
@@ -188,65 +184,3 @@ def parse_scenario(content: str, overrides: str = "", source: str = "scenario") 
             f" of {scenario.category} has none; leave task.base out"
         )
     return scenario
-
-
-def read_section(schema: type[Any], content: str, source: str) -> Any:
-    """Reads YAML text into a dataclass; see `load_scenario` for what is refused.
-
-    Args:
-        schema: The dataclass; each field needs a default.
-        content: A YAML mapping of its fields.
-        source: Where the text comes from, for messages.
-
-    Raises:
-        ScenarioError: A key or value that does not fit.
-    """
-    return _typed(schema, _mapping(content, source), source)
-
-
-def _mapping(content: str, source: str) -> dict[str, Any]:
-    """Parses YAML text that must be a mapping."""
-    try:
-        data = parse_yaml(content) if content.strip() else {}
-    except ValueError as error:
-        raise ScenarioError(f"{source}: not YAML: {error}") from None
-    if not isinstance(data, dict):
-        raise ScenarioError(f"{source}: must be a YAML mapping, found {type(data).__name__}")
-    return data
-
-
-def _merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
-    """Returns `base` with the values of `over` put over it, level by level."""
-    merged = dict(base)
-    for key, value in over.items():
-        old = merged.get(key)
-        both = isinstance(old, dict) and isinstance(value, dict)
-        merged[key] = _merge(merged[key], value) if both else value
-    return merged
-
-
-def _typed(schema: type[Any], data: Any, source: str, defaults: Any = None) -> Any:
-    """Reads one section with Drake's typed YAML reader, which refuses unknown keys."""
-    try:
-        section = yaml_load_typed(  # type: ignore[no-untyped-call]
-            schema=schema,
-            data=yaml.safe_dump(data or {}),
-            defaults=schema() if defaults is None else defaults,
-        )
-        _check(section)
-        return section
-    except ScenarioError as error:
-        raise ScenarioError(f"{source}: {error}") from None
-    # Drake's reader reports what does not fit the schema in these ways.
-    except (AssertionError, AttributeError, RuntimeError, TypeError, ValueError) as error:
-        raise ScenarioError(f"{source}: {' '.join(str(error).split())}") from None
-
-
-def _check(section: Any) -> None:
-    """Runs the checks of a dataclass and its parts again: the reader sets fields after them."""
-    for item in dataclasses.fields(section):
-        value = getattr(section, item.name)
-        if dataclasses.is_dataclass(value):
-            _check(value)
-    if hasattr(section, "__post_init__"):
-        section.__post_init__()

@@ -1,7 +1,6 @@
 """A reach under way in a diagram: its context, its simulator and what the rollout reads."""
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from lic_drake.clutter.instance import ClutterInstance
@@ -10,9 +9,7 @@ from lic_drake.reach.trace import SceneState
 from lic_drake.scene.collision import is_touching
 from lic_drake.scene.furnish import furnish
 from lic_drake.scene.scene import SceneConfig
-
-Vector = NDArray[np.float64]
-
+from lic_drake.types import Vector
 
 ROUNDING = 1e-9
 """Four steps of exactly 10 ms end 1e-17 s before or after 40 ms; half of the control periods then

@@ -9,7 +9,7 @@ import numpy as np
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import RequestError
-from lic_drake.reach.hand_poses import HandPoses, Vector
+from lic_drake.reach.hand_poses import HandPoses
 from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.reach.pointing_starts import pointing_starts, standing_at
 from lic_drake.reach.scenario import Scenario
@@ -17,6 +17,7 @@ from lic_drake.reach.task import BaseTrack, StartLine
 from lic_drake.robots.pr2 import Pr2Arm
 from lic_drake.robots.registry import get_robot
 from lic_drake.seeds import make_generator
+from lic_drake.types import Vector
 
 TOLERANCE = 1e-6
 """A base or a hand this near to its bounds, in metres, counts as inside."""

@@ -4,7 +4,6 @@ import gc
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.reach.diagram import make_reach_diagram
@@ -14,8 +13,7 @@ from lic_drake.reach.trace import SceneState
 from lic_drake.reach.waking import PartlyAsleep
 from lic_drake.scene.sleep import SkinAxes
 from lic_drake.scene.stem_sleep import StemMonitor
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 MAX_DIAGRAMS = 8
 """Diagrams that are kept, each with other stems awake."""

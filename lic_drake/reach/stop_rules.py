@@ -5,9 +5,9 @@ from collections import deque
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.errors import ScenarioError
+from lic_drake.types import Vector
 
 MAX_TIMEOUT_S = 3600.0
 """Longer reaches are refused: simulating one would take minutes."""
@@ -49,20 +49,18 @@ class StopConfig:
 class StopMonitor:
     """Follows a reach sample by sample and says when and how it ends."""
 
-    def __init__(self, config: StopConfig, p_WG: NDArray[np.float64], period_s: float) -> None:
+    def __init__(self, config: StopConfig, p_WG: Vector, period_s: float) -> None:
         self._config = config
         self._p_WG = p_WG
         # Tip positions and smallest distances from now back to so long ago, at the control period.
-        self._recent: deque[NDArray[np.float64]] = deque(
-            maxlen=_samples(config, period_s, config.stuck_time_s)
-        )
+        self._recent: deque[Vector] = deque(maxlen=_samples(config, period_s, config.stuck_time_s))
         self._nearest: deque[float] = deque(
             maxlen=_samples(config, period_s, config.progress_time_s)
         )
         self._low_force_time_s = 0.0
         self.min_distance = np.inf
 
-    def update(self, time_s: float, p_WE: NDArray[np.float64], peak_force: float) -> str | None:
+    def update(self, time_s: float, p_WE: Vector, peak_force: float) -> str | None:
         """Takes a sample; returns the outcome if the reach ends with it, else None.
 
         Args:

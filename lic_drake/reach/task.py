@@ -3,12 +3,10 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.errors import ScenarioError
 from lic_drake.robots.arm import Arm
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 MAX_GRID_STEPS = 1000
 """A finer grid than this in one direction is refused."""

@@ -3,7 +3,6 @@
 from abc import ABC, abstractmethod
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.reach.scenario import Scenario
@@ -11,8 +10,7 @@ from lic_drake.reach.simulation import Simulation
 from lic_drake.reach.simulation_pool import SimulationPool
 from lic_drake.reach.trace import SceneState
 from lic_drake.scene.sleep import SkinAxes, SleepMonitor, put_to_sleep
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 FEWEST_SPARES = 2
 """Spare objects of the first diagram that has any; every further one has twice as many. Their

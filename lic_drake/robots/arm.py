@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, ModelInstanceIndex
 
+from lic_drake.types import Vector
+
 if TYPE_CHECKING:
     from lic_drake.robots.skin_shape import SkinShape
-
-Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,9 +107,7 @@ class Arm(Protocol):
         """Returns R_RL, shape (k, 3, 3), and p_RL, shape (k, 3), of the skin links."""
         ...
 
-    def point_jacobians(
-        self, q: Vector, links: NDArray[np.intp], p_RQ: Vector
-    ) -> NDArray[np.float64]:
+    def point_jacobians(self, q: Vector, links: NDArray[np.intp], p_RQ: Vector) -> Vector:
         """Returns Jv_v_RQ of points Q on skin links, shape (n, 3, m), m/rad.
 
         Args:

@@ -13,9 +13,10 @@ from pydrake.multibody.tree import Frame, ModelInstanceIndex
 
 from lic_drake.errors import ScenarioError
 from lic_drake.paths import models_dir
-from lic_drake.robots.arm import SkinCapsule, Vector
+from lic_drake.robots.arm import SkinCapsule
 from lic_drake.robots.planar_kinematics import PlanarArmKinematics
 from lic_drake.robots.skin_shape import SkinShape
+from lic_drake.types import Vector
 
 LINK_NAMES = ("link1", "link2", "link3")
 """Names of the links in a description, proximal to distal."""

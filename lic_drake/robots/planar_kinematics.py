@@ -8,9 +8,8 @@ and the last link's direction phi = q1 + q2 + q3 - pi/2, counted from +x.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 
 def wrap_angle(angle: float) -> float:

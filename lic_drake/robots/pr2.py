@@ -11,7 +11,6 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, ModelInstanceIndex
 
 from lic_drake.errors import ScenarioError
-from lic_drake.robots.arm import Vector
 from lic_drake.robots.pr2_description import (
     BASE_JOINTS,
     LEFT_ARM_AT_REST,
@@ -26,6 +25,7 @@ from lic_drake.robots.pr2_description import (
 )
 from lic_drake.robots.pr2_inverse import calc_preselection_cost, solve_pose
 from lic_drake.robots.pr2_kinematics import Pr2Kinematics, calc_point_jacobians
+from lic_drake.types import Vector
 
 MPC_LIMITS_DEG = np.array(
     [

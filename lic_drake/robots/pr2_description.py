@@ -17,8 +17,9 @@ from pydrake.multibody.tree import (
 )
 
 from lic_drake.paths import models_dir
-from lic_drake.robots.pr2_kinematics import ArmLengths, Vector
+from lic_drake.robots.pr2_kinematics import ArmLengths
 from lic_drake.robots.skin_shape import SkinShape
+from lic_drake.types import Vector
 
 JOINTS = (
     "shoulder_pan",

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lic_drake.robots.pr2_kinematics import Pr2Kinematics, Vector
+from lic_drake.robots.pr2_kinematics import Pr2Kinematics
+from lic_drake.types import Vector
 
 NUM_PAN_ANGLES = 271
 """Pan angles that are tried over the joint's range: one every half degree."""

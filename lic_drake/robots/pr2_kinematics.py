@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
+
 _Axis = tuple[float, float, float]
 
 _ZEROS = (0.0,) * 7

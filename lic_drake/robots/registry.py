@@ -3,13 +3,12 @@
 from collections.abc import Callable
 
 from lic_drake.errors import ScenarioError
-from lic_drake.extensions import load_extensions
-from lic_drake.registration import add_entry
+from lic_drake.registry import Registry
 from lic_drake.robots.arm import Arm
 from lic_drake.robots.planar import planar_arm
 from lic_drake.robots.pr2 import pr2_arm
 
-_ROBOTS: dict[str, Callable[[], Arm]] = {}
+_ROBOTS: Registry[Callable[[], Arm]] = Registry("robot", ScenarioError)
 
 
 def register_robot(name: str, make: Callable[[], Arm]) -> None:
@@ -28,7 +27,7 @@ def register_robot(name: str, make: Callable[[], Arm]) -> None:
             f"robot {name!r} needs a function that returns it, got {make!r}; register the function,"
             " not the robot"
         )
-    add_entry(_ROBOTS, "robot", name, make, ScenarioError)
+    _ROBOTS.register(name, make)
 
 
 def get_robot(name: str) -> Arm:
@@ -37,10 +36,7 @@ def get_robot(name: str) -> Arm:
     Raises:
         ScenarioError: The robot is unknown.
     """
-    load_extensions()
-    if name not in _ROBOTS:
-        raise ScenarioError(f"unknown robot {name!r}; choose one of {', '.join(_ROBOTS)}")
-    return _ROBOTS[name]()
+    return _ROBOTS.get(name)()
 
 
 register_robot("planar-arm", planar_arm)

@@ -6,7 +6,8 @@ from typing import Literal
 
 import numpy as np
 
-from lic_drake.robots.arm import SkinCapsule, Vector
+from lic_drake.robots.arm import SkinCapsule
+from lic_drake.types import Vector
 
 _ALONG = (
     np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),

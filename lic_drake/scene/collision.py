@@ -4,15 +4,13 @@ from dataclasses import replace
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.geometry import CollisionFilterDeclaration, GeometrySet, QueryObject
 from pydrake.systems.framework import Context, DiagramBuilder
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.robots.arm import Arm
 from lic_drake.scene.scene import Scene, SceneConfig, add_scene
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 
 def is_touching(scene: Scene, root: Context) -> bool:

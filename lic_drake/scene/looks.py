@@ -1,11 +1,11 @@
 """What things look like."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.types import Vector
 
-Color = NDArray[np.float64]
+Color = Vector
 """RGBA, shape (4,), each 0 to 1."""
 
 FIXED_COLOR = np.array([0.55, 0.25, 0.20, 1.0])

@@ -1,7 +1,6 @@
 """Bodies that can be pushed: on the ground against dry friction, or floating against drag."""
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     Joint,
@@ -13,6 +12,8 @@ from pydrake.multibody.tree import (
     UnitInertia,
 )
 
+from lic_drake.types import Vector
+
 CARRIAGE_SHARE = 1e-3
 """Mass of a body that only carries another along one axis, as a share of the other's."""
 
@@ -22,7 +23,7 @@ def add_sliding_body(
     clutter: ModelInstanceIndex,
     name: str,
     mass: float,
-    p_WO: NDArray[np.float64],
+    p_WO: Vector,
     friction_N: float,
     creep_m_per_s: float,
 ) -> RigidBody:
@@ -55,7 +56,7 @@ def add_floating_body(
     clutter: ModelInstanceIndex,
     name: str,
     mass: float,
-    p_WO: NDArray[np.float64],
+    p_WO: Vector,
     drag_N_s_per_m: float,
 ) -> RigidBody:
     """Adds a body that floats, without turning, against viscous drag.
@@ -80,7 +81,7 @@ def _add_carried_body(
     clutter: ModelInstanceIndex,
     name: str,
     mass: float,
-    p_WO: NDArray[np.float64],
+    p_WO: Vector,
     damping: float = 0.0,
 ) -> tuple[RigidBody, list[Joint]]:
     """Adds a body that translates along x, y .. as far as p_WO goes, on light carriages."""

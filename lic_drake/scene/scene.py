@@ -4,7 +4,6 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.geometry import (
     Box,
     Cylinder,
@@ -33,6 +32,7 @@ from lic_drake.scene.contact import ContactConfig, object_properties, skin_prope
 from lic_drake.scene.looks import BASE_COLOR, object_color
 from lic_drake.scene.movables import add_floating_body, add_sliding_body
 from lic_drake.scene.stems import add_stems
+from lic_drake.types import Vector
 
 TIME_STEP_RANGE_S = (1e-5, 0.1)
 """Shortest and longest step of a discrete plant."""
@@ -277,7 +277,7 @@ def pose_of(instance: ClutterInstance, i: int) -> RigidTransform:
     return RigidTransform(RollPitchYaw(0.0, 0.0, instance.yaw[i]), instance.p_WO[i])
 
 
-def make_shape(shape: str, size: NDArray[np.float64]) -> Shape:
+def make_shape(shape: str, size: Vector) -> Shape:
     """Returns Drake's shape for a `ClutterInstance` entry."""
     match shape:
         case "cylinder":

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.robots.arm import Arm
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 WAKE_M = 0.02
 """A sleeping object wakes up when the gap between it and the arm, or a pushed object, is smaller.

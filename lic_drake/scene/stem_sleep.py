@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from lic_drake.clutter.stems import Stems
 from lic_drake.scene.sleep import MAX_MOVE_M, WAKE_M, MovedTooFarError, SkinAxes
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 GROUP_M = 0.08
 """Where a stem wakes up, so do all whose gap is this much larger: to wake one costs as much as to

@@ -32,8 +32,6 @@ from lic_drake.clutter.stems import Stems
 from lic_drake.scene.looks import BRANCH_COLOR, LEAF_COLORS, STEM_COLOR
 from lic_drake.scene.movables import CARRIAGE_SHARE
 
-Vector = NDArray[np.float64]
-
 _RIM_POINTS = 12
 """Corners of a leaf as it is drawn."""
 

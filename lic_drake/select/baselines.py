@@ -4,14 +4,12 @@ import time
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.errors import RequestError
 from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.reach.request import IN_PLANE
 from lic_drake.select.situation import Selection, Situation
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 HAND_LENGTH_M = 0.288
 """Length of the last link with the tip, metres."""

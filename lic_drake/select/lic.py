@@ -5,7 +5,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.errors import RequestError
 from lic_drake.estimate.checks import EstimateError
@@ -13,8 +12,7 @@ from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.select.baselines import make_selection
 from lic_drake.select.objective import Objective, SuccessModel, SuccessObjective
 from lic_drake.select.situation import FailedReach, Selection, Situation
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 
 class LicSelector(ABC):

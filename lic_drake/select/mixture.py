@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.errors import RequestError
 from lic_drake.estimate.final_position import FinalPositions
@@ -20,8 +19,7 @@ from lic_drake.robots.planar import PlanarArm
 from lic_drake.select.objective import SuccessObjective
 from lic_drake.select.planar_lic import PlanarLic
 from lic_drake.select.situation import FailedReach, Situation
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 LEAST_PROBABILITY = 0.02
 """Estimates of success or failure count as no smaller than this in Bayes' rule: an estimator that

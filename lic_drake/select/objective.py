@@ -4,14 +4,12 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.estimate.estimator import SuccessEstimator
 from lic_drake.estimate.features import FeatureMap
 from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.select.situation import FailedReach
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 
 @dataclass(frozen=True, kw_only=True)

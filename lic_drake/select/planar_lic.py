@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from lic_drake.reach.initial_conditions import InitialConditions
@@ -13,8 +12,7 @@ from lic_drake.select.lic import LicSelector
 from lic_drake.select.objective import SuccessModel, SuccessObjective
 from lic_drake.select.planar_program import PlanarProgram
 from lic_drake.select.situation import Situation
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 NUM_SOLVES = 6
 """Starting points of the optimisation: the best of the library's starts and of a lattice."""

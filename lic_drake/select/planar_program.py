@@ -8,9 +8,8 @@ from pydrake.solvers import MathematicalProgram, NloptSolver, SolverOptions
 from lic_drake.reach.starts import Region
 from lic_drake.robots.planar_kinematics import PlanarArmKinematics
 from lic_drake.select.objective import SuccessObjective
+from lic_drake.types import Vector
 from lic_drake.weak_method import weakly
-
-Vector = NDArray[np.float64]
 
 
 class PlanarProgram:

@@ -14,8 +14,7 @@ from lic_drake.select.objective import SuccessObjective
 from lic_drake.select.pointing_places import LATTICE_M, find_neighbours, make_lattice
 from lic_drake.select.pointing_program import PointingProgram
 from lic_drake.select.situation import Situation
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 FINE_M = 0.003
 """Around the best places of a lattice the distance of places is halved until it is at most this."""

@@ -3,13 +3,11 @@
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.reach.pointing_starts import PointingStarts
 from lic_drake.reach.task import Stand
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 LATTICE_M = 0.025
 """Largest distance of neighbouring places of the base and heights of the torso in a lattice."""

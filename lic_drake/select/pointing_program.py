@@ -9,9 +9,8 @@ from pydrake.solvers import MathematicalProgram, SnoptSolver, SolverOptions
 from lic_drake.reach.pointing_starts import PointingStarts
 from lic_drake.robots.pr2 import Pr2Arm
 from lic_drake.select.objective import SuccessObjective
+from lic_drake.types import Vector
 from lic_drake.weak_method import weakly
-
-Vector = NDArray[np.float64]
 
 CLEARANCE_M = 0.001
 """The arm keeps this far from board and body, metres."""

@@ -13,8 +13,7 @@ from lic_drake.experience.second_reach import SHOWN
 from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.reach.request import IN_PLANE, ReachRecord
 from lic_drake.reach.starts import ApertureStarts, LineStarts, Region, Starts
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 RETRY_DISTANCES_M = (0.1, 0.05, 0.025, 0.0, -1.0)
 """A further attempt starts more than the first of these from all failed ones across x: the "local

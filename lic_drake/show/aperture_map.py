@@ -5,12 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Rectangle
-from numpy.typing import NDArray
 
 from lic_drake.reach.pointing_starts import PointingStarts
 from lic_drake.select.objective import SuccessObjective
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 
 def estimate_apertures(objective: SuccessObjective, starts: PointingStarts) -> Vector:

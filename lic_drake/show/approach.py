@@ -3,15 +3,13 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.reach.pointing_starts import mobile_positions
 from lic_drake.robots.pr2 import Pr2Arm, pr2_arm
 from lic_drake.scene.collision import CollisionChecker
 from lic_drake.seeds import make_generator
 from lic_drake.show.motion_planning import is_path_free, plan_motion
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 MAX_NEWTON_STEPS = 10
 """Of the inverse kinematics along that way; where they do not suffice, the way ends."""

@@ -9,9 +9,10 @@ from lic_drake.evaluate.trial import Attempt
 from lic_drake.reach.rollout import simulate_request
 from lic_drake.reach.starts import Starts, find_region
 from lic_drake.select.lic import LicSelector
-from lic_drake.select.situation import FailedReach, Situation, Vector
+from lic_drake.select.situation import FailedReach, Situation
 from lic_drake.show.density import density_lattice, estimate_density
 from lic_drake.show.plots import draw_density, draw_snapshot
+from lic_drake.types import Vector
 
 SNAPSHOTS = 4
 """Samples of each reach that Fig. 5 shows."""

@@ -8,7 +8,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.errors import LicError
 from lic_drake.evaluate.trial import Attempt, run_trial
@@ -30,8 +29,7 @@ from lic_drake.show.looking_pictures import LookingPictures
 from lic_drake.show.pictures import AperturePictures, Pictures, PlanarPictures
 from lic_drake.show.pr2_meshes import LinkMesh
 from lic_drake.show.stills import save_stills
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 
 @dataclass(frozen=True, kw_only=True)

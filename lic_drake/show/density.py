@@ -1,14 +1,12 @@
 """The estimated probability of success over all starts (paper Fig. 6), as numbers."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.reach.starts import PlanarStarts, Region
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.situation import Situation
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 DENSITY_SHAPE = (81, 91)
 """Lattice of a density: y every 1 cm, phi every 2 degrees."""

@@ -5,13 +5,11 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.patches import Ellipse, Polygon
 from matplotlib.patheffects import withStroke
-from numpy.typing import NDArray
 
 from lic_drake.perception.apertures import DetectedApertures
 from lic_drake.perception.goal import DetectedGoal
 from lic_drake.perception.image import CameraImage
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 STATE_COLORS = {"open": "tab:green", "partly": "gold", "blocked": "tab:red", "unseen": "0.6"}
 """Colours of frames around apertures, by what they were found to be."""

@@ -19,10 +19,10 @@ from lic_drake.reach.rollout import simulate_request
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.starts import make_starts
 from lic_drake.select.registry import make_selector
-from lic_drake.select.situation import Vector
 from lic_drake.show.embed import read_page
 from lic_drake.show.plots import draw_top_view
 from lic_drake.show.recording import ReachRecording
+from lic_drake.types import Vector
 
 MAX_ENVIRONMENTS = 300
 """Environments that are tried before a library counts as one without failures, or successes."""

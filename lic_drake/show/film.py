@@ -17,8 +17,7 @@ from lic_drake.perception.config import CameraConfig, CamerasConfig
 from lic_drake.perception.views import add_rig
 from lic_drake.reach.pointing_starts import mobile_positions
 from lic_drake.reach.trace import SceneState
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 SHRINK = 2
 """A film has so many times fewer columns and rows than the cameras."""

@@ -23,8 +23,6 @@ from lic_drake.show.pictures import AperturePictures
 from lic_drake.show.plots import save_figure
 from lic_drake.show.pr2_meshes import LinkMesh
 
-Vector = NDArray[np.float64]
-
 FRAMES_PER_SECOND = 2.0
 """Of the film, in simulated time."""
 

@@ -4,7 +4,6 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.geometry import MeshcatVisualizer, MeshcatVisualizerParams, Role
 from pydrake.multibody.meshcat import ContactVisualizer, ContactVisualizerParams
 from pydrake.systems.framework import DiagramBuilder
@@ -21,8 +20,7 @@ from lic_drake.show.approach import WAITING_DEG, plan_approach
 from lic_drake.show.meshes import wear_meshes
 from lic_drake.show.pr2_meshes import LinkMesh
 from lic_drake.show.recording import MeshcatRecording
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 MOVE_S = 1.0
 """So long base, torso and arm each take to their places in the recording, at least, seconds."""

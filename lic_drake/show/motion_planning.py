@@ -3,9 +3,8 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 STEP_RAD = 0.25
 """How far a tree grows at a time."""

@@ -5,7 +5,6 @@ from dataclasses import replace
 from typing import NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.geometry import (
     Box,
     ClippingRange,
@@ -38,8 +37,7 @@ from lic_drake.robots.pr2 import Pr2Arm
 from lic_drake.scene.scene import add_scene
 from lic_drake.show.meshes import wear_meshes
 from lic_drake.show.pr2_meshes import LinkMesh
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 WIDTH, HEIGHT, FOCAL_PX = 1280, 960, 1100.0
 """Size of a photograph and focal length of its camera, pixels."""

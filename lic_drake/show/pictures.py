@@ -6,7 +6,6 @@ from typing import Protocol
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.evaluate.trial import Attempt
@@ -23,8 +22,7 @@ from lic_drake.show.mobile_recording import MobileRecording
 from lic_drake.show.plots import ATTEMPT_COLORS, draw_top_view, save_figure
 from lic_drake.show.pr2_meshes import LinkMesh
 from lic_drake.show.recording import ReachRecording
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 
 class Pictures(Protocol):

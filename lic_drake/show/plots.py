@@ -7,7 +7,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon, Rectangle
-from numpy.typing import NDArray
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import LicError
@@ -15,8 +14,7 @@ from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.robots.planar import PlanarArm
 from lic_drake.scene.looks import FIXED_COLOR, MOVABLE_COLOR
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 ATTEMPT_COLORS = ("tab:blue", "tab:purple", "tab:green", "tab:olive", "tab:cyan")
 """Colours of the first and further attempts, over and over again."""

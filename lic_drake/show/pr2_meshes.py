@@ -9,7 +9,6 @@ from typing import cast
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.geometry import GeometryProperties, Mesh, Rgba, Role, SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import PackageMap, Parser
@@ -19,6 +18,7 @@ from pydrake.multibody.tree import BodyIndex, ModelInstanceIndex
 from lic_drake.errors import ModelError
 from lic_drake.robots.pr2_description import add_pr2
 from lic_drake.show.drake_models import PACKAGE
+from lic_drake.types import Vector
 
 DESCRIPTION = Path("pr2_description", "urdf", "pr2_simplified.urdf")
 """The PR2 in the package."""
@@ -41,9 +41,9 @@ class LinkMesh:
 
     link: str
     path: Path
-    scale: NDArray[np.float64]
+    scale: Vector
     X_LM: RigidTransform
-    color: NDArray[np.float64] | None
+    color: Vector | None
 
 
 def read_pr2_meshes(package: Path) -> list[LinkMesh]:
@@ -114,7 +114,7 @@ def _carrier(
     return name
 
 
-def _color(properties: GeometryProperties | None) -> NDArray[np.float64] | None:
+def _color(properties: GeometryProperties | None) -> Vector | None:
     """Returns the colour that the source paints a mesh in."""
     if properties is None or not properties.HasProperty("phong", "diffuse"):
         return None

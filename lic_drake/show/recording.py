@@ -5,7 +5,6 @@ import math
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.geometry import Cylinder, Meshcat, MeshcatParams, Rgba, Sphere
 from pydrake.math import RigidTransform
 
@@ -15,8 +14,7 @@ from lic_drake.reach.diagram import make_reach_diagram
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.simulation import Simulation
 from lic_drake.reach.trace import ReachTrace
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 PAUSE_S = 1.0
 """Time between two reaches of a recording, at least."""

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import RenderingError
@@ -15,8 +14,7 @@ from lic_drake.reach.trace import ReachTrace
 from lic_drake.show.photographs import HEIGHT, WIDTH, Photograph, Photographer, View
 from lic_drake.show.plots import save_figure
 from lic_drake.show.pr2_meshes import LinkMesh
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 PLANAR_VIEWS = {"": View((-0.45, -0.62, 0.95), (0.46, 0.0, -0.08))}
 """From behind and above, to the right."""

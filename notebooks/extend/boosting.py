@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from lic_drake.estimate import checks
 from lic_drake.estimate.estimator import Prediction
 from lic_drake.estimate.registry import register_estimator
+from lic_drake.types import Vector
 
 
 class GradientBoosting:
@@ -21,7 +22,7 @@ class GradientBoosting:
     def __init__(self, step: float = 0.2) -> None:
         self.step = step
         self._model: Any = None
-        self._scale: checks.Vector = np.ones(0)
+        self._scale: Vector = np.ones(0)
 
     def fit(self, Z: ArrayLike, f: ArrayLike, environment: ArrayLike | None = None) -> Self:
         """Learns from features Z, shape (n, d), and successes f, shape (n,)."""
@@ -35,7 +36,7 @@ class GradientBoosting:
         self._model, self._scale = model.fit(Z, f), checks.feature_scale(Z)
         return self
 
-    def values(self, Z: ArrayLike) -> checks.Vector:
+    def values(self, Z: ArrayLike) -> Vector:
         """Returns the estimates at queries Z, shape (n, d): shape (n,)."""
         if self._model is None:
             raise checks.EstimateError("the trees have no rows yet; call fit(Z, f) first")
@@ -47,7 +48,7 @@ class GradientBoosting:
         p = self.values(Z)
         return Prediction(probability=p, spread=np.sqrt(p * (1.0 - p)))
 
-    def value_and_gradient(self, z: ArrayLike) -> tuple[float, checks.Vector]:
+    def value_and_gradient(self, z: ArrayLike) -> tuple[float, Vector]:
         """Returns the estimate at z, shape (d,), and its gradient."""
         z, h = np.asarray(z, dtype=float), np.diag(self.step * self._scale)
         values = self.values(np.vstack([z, z + h, z - h]))

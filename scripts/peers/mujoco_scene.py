@@ -23,6 +23,7 @@ from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import ScenarioError
 from lic_drake.robots.planar import PlanarArm
 from lic_drake.scene.scene import SceneConfig
+from lic_drake.types import Vector
 
 SKIN_STIFFNESS_N_PER_M = 46.8e3
 """Of a link pressed on a cylinder, measured in Drake with the shipped skin and meshes."""
@@ -230,7 +231,7 @@ def _metric_ratio(model: mujoco.MjModel, arm: PlanarArm, link: int, lightness: f
     return float(stiffened / plain)
 
 
-def _solref(stiffness_N_per_m: float, A: float) -> NDArray[np.float64]:
+def _solref(stiffness_N_per_m: float, A: float) -> Vector:
     """Returns MuJoCo's direct form: minus stiffness and damping, scaled by R."""
     return -(1.0 - IMPEDANCE) * A * np.array([stiffness_N_per_m, CONTACT_DAMPING_NS_PER_M])
 

@@ -5,16 +5,14 @@ Sensor maths, controller and stop rules are those of the package; only the physi
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.control.mpc_controller import HapticMpcController
 from lic_drake.control.surface_taxels import make_taxels
 from lic_drake.control.tactile import ContactPatch, calc_taxel_forces
 from lic_drake.reach.scenario import Scenario
+from lic_drake.types import Vector
 from peers.mujoco_scene import MujocoConfig, make_mujoco_scene
-
-Vector = NDArray[np.float64]
 
 
 class MujocoSimulation:

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.systems.analysis import Simulator
 
 from lic_drake.control.mpc_controller import HapticMpcController
@@ -17,6 +16,7 @@ from lic_drake.evaluate.speed import Stopwatch
 from lic_drake.reach.request import ReachRequest
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.trace import ReachResult
+from lic_drake.types import Vector
 from peers.engines import Engine
 from peers.mujoco_simulation import MujocoSimulation
 
@@ -111,7 +111,7 @@ class _Watches:
     def __exit__(self, *exception: object) -> None:
         self._stack.close()
 
-    def read(self) -> NDArray[np.float64]:
+    def read(self) -> Vector:
         """Returns the wall seconds in each of `PARTS` so far."""
         sensor = self._taxels.seconds + self._sense.seconds
         stepping = self._drake.seconds + self._mujoco.seconds
@@ -124,7 +124,7 @@ def _make_row(
     number: int,
     result: ReachResult,
     total_s: float,
-    parts: NDArray[np.float64],
+    parts: Vector,
     setup_s: float | None,
 ) -> Timing:
     stepping, sensor, mpc = parts.tolist()

@@ -36,7 +36,7 @@ class OneSphere:
 
 @pytest.fixture
 def _restore(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.setattr(registry, "_CATEGORIES", dict(registry._CATEGORIES))
+    monkeypatch.setattr(registry._CATEGORIES, "entries", dict(registry._CATEGORIES.entries))
     yield
 
 

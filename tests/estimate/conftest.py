@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.request import ReachRecord
 from lic_drake.reach.scenario import load_scenario
-
-Vector = NDArray[np.float64]
+from lic_drake.types import Vector
 
 BLANK = {str: "", int: 0, float: 0.0, bool: False, tuple[float, ...]: ()}
 

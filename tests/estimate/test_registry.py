@@ -20,7 +20,7 @@ def test_an_unknown_estimator_is_named_with_the_known_ones() -> None:
 
 
 def test_an_estimator_can_be_added_by_one_call(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(registry, "_ESTIMATORS", dict(registry._ESTIMATORS))
+    monkeypatch.setattr(registry._ESTIMATORS, "entries", dict(registry._ESTIMATORS.entries))
     given = []
     register_estimator("mine", lambda features: given.append(features) or make_estimator("knn"))
     assert make_estimator("mine") is not make_estimator("mine")

@@ -21,13 +21,13 @@ NAMES = ("shelf", "long_arm", "boosting")
 @pytest.fixture
 def extend(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, ModuleType]]:
     """The modules by name, registered until the end of the test."""
-    for module, registry in (
-        (clutter, "_CATEGORIES"),
-        (categories, "_CATEGORIES"),
-        (robots, "_ROBOTS"),
-        (estimate, "_ESTIMATORS"),
+    for registry in (
+        clutter._CATEGORIES,
+        categories._CATEGORIES,
+        robots._ROBOTS,
+        estimate._ESTIMATORS,
     ):
-        monkeypatch.setattr(module, registry, dict(getattr(module, registry)))
+        monkeypatch.setattr(registry, "entries", dict(registry.entries))
     monkeypatch.syspath_prepend(EXTEND)
     yield {name: import_module(name) for name in NAMES}
     for name in NAMES:

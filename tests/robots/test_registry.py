@@ -16,6 +16,6 @@ def test_an_unknown_robot_is_named_with_the_known_ones() -> None:
 
 
 def test_a_robot_can_be_added_by_one_call(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(registry, "_ROBOTS", dict(registry._ROBOTS))
+    monkeypatch.setattr(registry._ROBOTS, "entries", dict(registry._ROBOTS.entries))
     register_robot("another-arm", planar_arm)
     assert get_robot("another-arm") is planar_arm()

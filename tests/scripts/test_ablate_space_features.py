@@ -7,10 +7,10 @@ import pytest
 from ablate_space_features import AGAIN, PLAIN, RELATIVE, hold_out_goals, second_table
 
 from lic_drake.estimate.categories import features_of
-from lic_drake.estimate.checks import Vector
 from lic_drake.estimate.features import FeatureMap
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
+from lic_drake.types import Vector
 
 FEATURES = features_of("sphere-aperture-clutter")
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from fake_reach import fill_library
-from numpy.typing import NDArray
 from select_surfaces import Bumps
 from starts import ARM
 
@@ -14,6 +13,7 @@ from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.select import registry
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.registry import fit_model, make_selector
+from lic_drake.types import Vector
 
 QUERY = np.array([[0.6, 0.1, 0.2, 1.0]])
 END = {f"final_{name}": 0.1 for name in ("x", "y", "phi", "vx", "vy")}
@@ -30,7 +30,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> ExperienceLibrary:
     return library
 
 
-def second(selector: object) -> NDArray[np.float64]:
+def second(selector: object) -> Vector:
     """LIC-2's estimate after the failure of the added pair."""
     assert isinstance(selector, LicSelector) and selector.second is not None
     names = selector.second.features.names

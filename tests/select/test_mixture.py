@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from select_surfaces import Bumps, random_model
 from starts import ARM, LINE
 
@@ -16,6 +16,7 @@ from lic_drake.select.mixture import LEAST_PROBABILITY, Category, MixtureLic, po
 from lic_drake.select.objective import SuccessModel
 from lic_drake.select.planar_lic import PlanarLic
 from lic_drake.select.situation import FailedReach, Situation
+from lic_drake.types import Vector
 
 GOAL = np.array([0.6, 0.1, 0.0])
 FIRST = Situation(p_WG=GOAL, starts=LINE)
@@ -46,7 +47,7 @@ def mixture(prior: float, one: PlanarLic, two: PlanarLic, **values: object) -> M
     return MixtureLic(ARM, categories, **values)
 
 
-def failed_at(start: NDArray[np.float64], final: tuple[float, float] = (0.45, 0.05)) -> FailedReach:
+def failed_at(start: Vector, final: tuple[float, float] = (0.45, 0.05)) -> FailedReach:
     x0 = np.array([LINE.poses.line.x_m, *start])
     known = FailedReach.from_start(x0)
     names = ("final_x", "final_y", "final_phi", "final_vx", "final_vy")
@@ -95,7 +96,7 @@ def test_values_and_gradients_are_the_weighted_sums() -> None:
 
 @pytest.mark.parametrize(("prior", "best"), [(0.9, ONE), (0.1, TWO)])
 def test_the_likelier_category_decides_where_each_wants_another_start(
-    prior: float, best: NDArray[np.float64]
+    prior: float, best: Vector
 ) -> None:
     chosen = mixture(prior, lic(0.9, 0.0), lic(0.0, 0.9)).select(FIRST)
     np.testing.assert_allclose(chosen.x0[1:], best, atol=0.02)
@@ -154,7 +155,7 @@ class EndsAt:
 
     y: float
 
-    def log_density(self, z: ArrayLike, p_RE: ArrayLike) -> NDArray[np.float64]:
+    def log_density(self, z: ArrayLike, p_RE: ArrayLike) -> Vector:
         return np.where(np.abs(np.asarray(p_RE)[:, 1] - self.y) < 0.05, np.log(9.0), 0.0)
 
 

@@ -17,9 +17,8 @@ from lic_drake.estimate.checks import EstimateError
 from lic_drake.estimate.features import PLANAR_LIC1
 from lic_drake.estimate.nearest_neighbours import NearestNeighbours
 from lic_drake.estimate.registry import register_estimator
-from lic_drake.extensions import load_extensions
 from lic_drake.paths import models_dir
-from lic_drake.registration import add_entry
+from lic_drake.registry import Registry, load_extensions
 from lic_drake.robots.planar import PlanarArm, planar_arm
 from lic_drake.robots.registry import get_robot, register_robot
 
@@ -34,15 +33,14 @@ def make_category(name: str = "Mine", **changes: object) -> type:
 
 @pytest.fixture(autouse=True)
 def _restore(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(clutter, "_CATEGORIES", dict(clutter._CATEGORIES))
-    monkeypatch.setattr(categories, "_CATEGORIES", dict(categories._CATEGORIES))
-    monkeypatch.setattr(estimate, "_ESTIMATORS", dict(estimate._ESTIMATORS))
+    for registry in (clutter._CATEGORIES, categories._CATEGORIES, estimate._ESTIMATORS):
+        monkeypatch.setattr(registry, "entries", dict(registry.entries))
 
 
 @pytest.mark.parametrize("name", ["", "two words", "../up", "a.yaml", "tab\t", 7, None])
 def test_a_name_is_one_plain_word(name: object) -> None:
     with pytest.raises(LicError, match="name of a category"):
-        add_entry({}, "category", name, object(), LicError)
+        Registry("category", LicError).register(name, object())
 
 
 def test_a_cell_that_is_run_again_replaces_its_entry() -> None:
@@ -53,7 +51,7 @@ def test_a_cell_that_is_run_again_replaces_its_entry() -> None:
 
 def test_nobody_takes_anothers_name() -> None:
     register_category("mine", make_category())
-    with pytest.raises(ScenarioError, match=r"'mine' is known already.*choose another name"):
+    with pytest.raises(ScenarioError, match=r"'mine' is already registered.*choose another name"):
         register_category("mine", make_category("Yours"))
     with pytest.raises(ScenarioError, match="cylinder-clutter"):
         register_category("cylinder-clutter", make_category())

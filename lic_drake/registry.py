@@ -1,0 +1,94 @@
+"""`Registry`: entries by name, from the package and from modules of the user's own."""
+
+import os
+from functools import cache
+from importlib import import_module
+
+from lic_drake.errors import LicError
+
+VARIABLE = "LIC_EXTENSIONS"
+"""Environment variable with the names of modules to import, separated by commas."""
+
+
+class Registry[T]:
+    """Categories, robots or estimators by name.
+
+    Looking a name up first imports the modules that `LIC_EXTENSIONS` names, so that the command
+    line and worker processes, which inherit the environment, know what those modules register.
+
+    Attributes:
+        entries: The entries registered so far.
+    """
+
+    def __init__(self, kind: str, error: type[LicError]) -> None:
+        """Makes an empty registry.
+
+        Args:
+            kind: What an entry is, for messages.
+            error: What to raise.
+        """
+        self.entries: dict[str, T] = {}
+        self._kind = kind
+        self._error = error
+
+    def register(self, name: str, entry: T) -> None:
+        """Adds an entry.
+
+        The code that registered an entry may register it again, as a notebook cell does that is
+        run twice; no other code may take its name.
+
+        Raises:
+            LicError: The name is not a plain word or is taken.
+        """
+        if not isinstance(name, str) or not name.replace("-", "").replace("_", "").isalnum():
+            raise self._error(
+                f"{name!r} cannot be the name of a {self._kind}; use letters, digits, hyphens and"
+                " underscores"
+            )
+        if name in self.entries and _origin(self.entries[name]) != _origin(entry):
+            raise self._error(
+                f"the {self._kind} {name!r} is already registered by"
+                f" {'.'.join(_origin(self.entries[name]))}; choose another name"
+            )
+        self.entries[name] = entry
+
+    def get(self, name: str) -> T:
+        """Returns the entry with this name.
+
+        Raises:
+            LicError: There is none.
+        """
+        load_extensions()
+        if name not in self.entries:
+            raise self._error(
+                f"unknown {self._kind} {name!r}; choose one of {', '.join(self.entries)}"
+            )
+        return self.entries[name]
+
+    def names(self) -> tuple[str, ...]:
+        """Returns all names, in the order of registration."""
+        load_extensions()
+        return tuple(self.entries)
+
+
+@cache
+def load_extensions() -> None:
+    """Imports the modules that `LIC_EXTENSIONS` names, once per process.
+
+    Raises:
+        LicError: A module cannot be imported.
+    """
+    for name in filter(None, map(str.strip, os.environ.get(VARIABLE, "").split(","))):
+        try:
+            import_module(name)
+        except (ImportError, TypeError) as error:  # A relative name is a TypeError.
+            raise LicError(
+                f"{VARIABLE} names {name!r}, which cannot be imported ({error}); put the folder of"
+                f" {name}.py on PYTHONPATH"
+            ) from error
+
+
+def _origin(entry: object) -> tuple[str, str]:
+    """Returns module and name of the class or function that an entry is or was made by."""
+    maker = entry if hasattr(entry, "__qualname__") else type(entry)
+    return str(maker.__module__), str(getattr(maker, "__qualname__", maker))
