@@ -31,13 +31,10 @@ notebooks: $(STAMP)
 
 # Tables I to IV, bounds and figures from the committed records, in a minute.
 tables: $(STAMP)
-	for table in 1_cylinder 2_t_tests 3_passage 4_aperture; do \
-	  $(PYTHON_IN_VENV) scripts/table_$$table.py || exit 1; done
-	$(PYTHON_IN_VENV) scripts/tabulate_bounds.py
-	$(PYTHON_IN_VENV) scripts/tabulate_second_attempts.py
-	$(PYTHON_IN_VENV) scripts/table_pr2.py
-	$(PYTHON_IN_VENV) scripts/table_foliage.py
-	$(PYTHON_IN_VENV) scripts/make_figures.py
+	$(PYTHON_IN_VENV) scripts/tables/run.py
+	$(PYTHON_IN_VENV) scripts/bounds/table.py
+	$(PYTHON_IN_VENV) scripts/second_attempts/table.py
+	$(PYTHON_IN_VENV) scripts/tables/figures.py
 
 # The records themselves, from nothing in some hours; interrupted, it goes on where it was. What is
 # there is not simulated again: delete notebooks/results and models/experience for a new start.

@@ -30,7 +30,7 @@ done
 # How much it matters that the first attempt moved objects.
 evaluate cylinder-clutter 200 10 --methods rnd cost gp --fresh --variant fresh
 # LIC-2 from real second attempts.
-python scripts/collect_second_attempts.py models/experience/cylinder-clutter \
+python scripts/second_attempts/run.py models/experience/cylinder-clutter \
     $results/second_attempts/cylinder-clutter --first 20 --environments 20
 evaluate cylinder-clutter 200 10 --methods gp --variant real-pairs \
     --second-attempts $results/second_attempts/cylinder-clutter
@@ -38,10 +38,10 @@ evaluate cylinder-clutter 200 10 --methods gp --variant real-pairs \
 evaluate cylinder-clutter 50 10 --methods rnd cost gp --attempts 5 --variant five-attempts
 
 # Bounds, and LIC's two attempts at the same goals.
-python scripts/measure_bounds.py cylinder-clutter --stream holdout --environments 40 --goals 10 \
+python scripts/bounds/run.py cylinder-clutter --stream holdout --environments 40 --goals 10 \
     --common-goals
-python scripts/measure_bounds.py passage-clutter --stream holdout --environments 300
-python scripts/measure_bounds.py cylinder-aperture-clutter --stream evaluation --environments 100
+python scripts/bounds/run.py passage-clutter --stream holdout --environments 300
+python scripts/bounds/run.py cylinder-aperture-clutter --stream evaluation --environments 100
 evaluate_on_bounds() {
     category=$1
     shift
@@ -51,7 +51,7 @@ evaluate_on_bounds() {
 evaluate_on_bounds cylinder-clutter --stream holdout --common-goals --environments 40 --goals 10
 evaluate_on_bounds passage-clutter --stream holdout --environments 300
 evaluate_on_bounds cylinder-aperture-clutter --environments 100
-python scripts/learning_curve.py
+python scripts/learning_curve/run.py
 
 # The PR2, with half of the apertures blocked; base and torso move, or stay.
 evaluate_pr2() {
@@ -60,7 +60,7 @@ evaluate_pr2() {
 }
 evaluate_pr2
 evaluate_pr2 --still --variant still
-python scripts/measure_bounds.py sphere-aperture-clutter --environments 100 --still \
+python scripts/bounds/run.py sphere-aperture-clutter --environments 100 --still \
     --set '{clutter: {num_blocked: 10}}'
 
 # Before foliage: apertures and goal seen by cameras or known; learned among spheres or foliage.

@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from lic_drake.evaluate.learning import LearningPoint, write_learning_curves
 from lic_drake.evaluate.paper import TABLES, PaperTable
 from lic_drake.evaluate.trials import TrialRow, write_trials
+from scripts.learning_curve.curve import LearningPoint, write_learning_curves
 
 
 def make_rows(

@@ -25,8 +25,7 @@ def add_parser(subparsers: Subparsers) -> None:
         help="choose the start pose of a reach",
         description="Chooses the start pose for a goal from an experience library and prints it"
         " with its estimated probability of success.",
-        epilog="examples: lic select --goal 0.6 0.1 --method gp; lic select --goal 0.6 0.1"
-        " --category cylinder-clutter=0.5 passage-clutter=0.5",
+        epilog="example: lic select --goal 0.6 0.1 --method gp",
     )
     parser.add_argument(
         "--goal",
@@ -49,13 +48,6 @@ def add_parser(subparsers: Subparsers) -> None:
     )
     add_library_argument(parser)
     parser.add_argument(
-        "--category",
-        nargs="+",
-        metavar="NAME=P",
-        help="where it is not known which one it is: planar categories with a shipped library and"
-        " their probabilities, which add up to 1 (default: the library's category)",
-    )
-    parser.add_argument(
         "--seed", type=non_negative_int, default=0, metavar="N", help="for rnd (default: 0)"
     )
     add_json_argument(parser)
@@ -72,24 +64,12 @@ def run(args: argparse.Namespace) -> int:
     from lic_drake.paths import shipped_library
     from lic_drake.reach.request import check_goal
     from lic_drake.reach.starts import make_starts
-    from lic_drake.select.mixture_maker import make_mixture, with_common_starts
-    from lic_drake.select.registry import Selector, make_selector, needs_library
+    from lic_drake.select.registry import make_selector, needs_library
     from lic_drake.select.situation import Situation
 
     needs_library(args.method)
     library = ExperienceLibrary(args.library or shipped_library("cylinder-clutter"))
-    libraries: dict[str, ExperienceLibrary] = {}
-    if args.category is None:
-        scenario = library.scenario()
-    else:
-        if args.library is not None:
-            raise RequestError("--category takes the shipped libraries; leave out --library")
-        probability = dict(map(_probability, args.category))
-        for name in probability:
-            if not shipped_library(name).exists():
-                raise RequestError(f"no library of {name!r} is shipped; see `lic demo --help`")
-        libraries = {name: ExperienceLibrary(shipped_library(name)) for name in probability}
-        scenario = with_common_starts(next(iter(libraries.values())))
+    scenario = library.scenario()
     instance = scenario.sample_instance("evaluation", args.seed)
     if len(args.goal) != instance.num_axes:
         raise RequestError(
@@ -104,20 +84,14 @@ def run(args: argparse.Namespace) -> int:
     failed = tuple(_failed_start(scenario, starts, *numbers) for numbers in args.failed)
     situation = Situation(p_WG=p_WG, starts=starts, failed=failed)
     rng = np.random.default_rng(args.seed)
-    selector: Selector
-    belief: dict[str, float] = {}
-    if libraries:
-        selector = make_mixture(libraries, probability, args.method)
-        belief = selector.belief(situation)
-    else:
-        selector = make_selector(
-            args.method,
-            scenario.arm(),
-            library.columns(),
-            rng,
-            scenario.category,
-            added=added_columns(library),
-        )
+    selector = make_selector(
+        args.method,
+        scenario.arm(),
+        library.columns(),
+        rng,
+        scenario.category,
+        added=added_columns(library),
+    )
     chosen = selector.select(situation)
     if args.json:
         print(
@@ -130,7 +104,6 @@ def run(args: argparse.Namespace) -> int:
                     "joint_angles": chosen.q.tolist(),
                     "estimated_success": chosen.probability,
                     "seconds": chosen.seconds,
-                    **({"categories": belief} if belief else {}),
                 }
             )
         )
@@ -152,27 +125,7 @@ def run(args: argparse.Namespace) -> int:
         f"{chosen.method}: {where}{base}{estimate}; joint angles"
         f" {np.round(np.rad2deg(chosen.q), 1).tolist()} degrees; {chosen.seconds:.2f} s"
     )
-    if belief:
-        print("it is " + ", ".join(f"{name} with {100 * p:.0f} %" for name, p in belief.items()))
     return 0
-
-
-def _probability(text: str) -> tuple[str, float]:
-    """Reads NAME=P.
-
-    Raises:
-        RequestError: It is not of that form.
-    """
-    from lic_drake.errors import RequestError
-
-    name, _, value = text.partition("=")
-    try:
-        return name, float(value)
-    except ValueError:
-        raise RequestError(
-            f"--category needs NAME=P with a number P, for instance passage-clutter=0.5, got"
-            f" {text!r}"
-        ) from None
 
 
 def _failed_start(scenario: "Scenario", starts: "Starts", y: float, other: float) -> "FailedReach":

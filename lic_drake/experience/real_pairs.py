@@ -41,7 +41,7 @@ def pair_real_attempts(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray
     second = np.flatnonzero(lengths == len(start))
     if len(second) == 0:
         raise LibraryError(
-            "the library holds no second attempts; scripts/collect_second_attempts.py makes some"
+            "the library holds no second attempts; scripts/second_attempts/run.py makes some"
         )
     try:
         first = np.array(

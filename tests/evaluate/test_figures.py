@@ -7,15 +7,12 @@ from matplotlib.figure import Figure
 
 from lic_drake.estimate.cross_validation import CalibrationBin
 from lic_drake.evaluate.figures import (
-    COLORS,
     AttemptCounts,
     draw_calibration,
-    draw_learning_curve,
     draw_success_bars,
     draw_success_by_attempts,
     draw_success_by_goal,
 )
-from lic_drake.evaluate.learning import LearningPoint
 from lic_drake.evaluate.statistics import Count
 from lic_drake.intervals import wilson_interval
 
@@ -79,21 +76,6 @@ def test_the_first_attempt_is_drawn_over_the_total(ax: Axes) -> None:
 def test_the_papers_strategies_that_we_did_not_try_are_drawn_too(ax: Axes) -> None:
     draw_success_bars(ax, {}, PAPER)
     assert len(ax.patches) == 2
-
-
-def test_a_learning_curve_is_sorted_and_logarithmic(ax: Axes) -> None:
-    points = [
-        LearningPoint(size=n, value=v, low=v - 0.02, high=v + 0.01)
-        for n, v in ((1000, 0.6), (250, 0.5), (18900, 0.65))
-    ]
-    assert draw_learning_curve(ax, {"gp": points, "other": points[:1]}, "success") is ax
-    (line, ends, color), _ = bars(ax)
-    np.testing.assert_allclose(line, [[250, 0.5], [1000, 0.6], [18900, 0.65]])
-    np.testing.assert_allclose(ends, line[:, 1:] + [-0.02, 0.01])
-    assert color == COLORS["gp"]
-    assert ax.get_xscale() == "log"
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("reaches in the library", "success")
-    assert legend(ax) == ["LIC(GP)", "other"]
 
 
 def test_calibration_shows_observed_against_predicted_with_intervals(ax: Axes) -> None:

@@ -7,13 +7,13 @@ from ray_casting import OTHER, blank, draw_boxes, draw_instance, tilted
 from lic_drake.clutter.foliage import FoliageApertureClutter
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import PerceptionError, ScenarioError
-from lic_drake.evaluate.perception_errors import true_states
 from lic_drake.perception.apertures import BoardModel, DetectedApertures, find_apertures
 from lic_drake.perception.board_plane import find_board_plane
 from lic_drake.perception.config import CameraConfig, PoseErrorConfig
 from lic_drake.perception.image import CameraImage
 from lic_drake.perception.noise import disturbed_image
 from lic_drake.seeds import make_generator
+from scripts.perception.errors import true_states
 
 BARE = FoliageApertureClutter(num_stems=0, num_branches=0, leaves_per_stem=0)
 CAMERA = CameraConfig(pose_error=PoseErrorConfig(translation_m=0.0, rotation_deg=0.0))

@@ -9,7 +9,7 @@ import pytest
 
 SCRIPT = """
 from lic_drake.errors import LicError
-from lic_drake.evaluate.perception_errors import measure_scene
+from scripts.perception.errors import measure_scene
 from lic_drake.perception.config import load_cameras
 from lic_drake.reach.scenario import load_scenario
 scenario = load_scenario("foliage-aperture-clutter")

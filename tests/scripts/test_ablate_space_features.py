@@ -1,16 +1,16 @@
 import sys
 from pathlib import Path
 
-import ablate_space_features
 import numpy as np
 import pytest
-from ablate_space_features import AGAIN, PLAIN, RELATIVE, hold_out_goals, second_table
 
 from lic_drake.estimate.categories import features_of
 from lic_drake.estimate.features import FeatureMap
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 from lic_drake.types import Vector
+from scripts.ablation import space_features as ablate_space_features
+from scripts.ablation.space_features import AGAIN, PLAIN, RELATIVE, hold_out_goals, second_table
 
 FEATURES = features_of("sphere-aperture-clutter")
 

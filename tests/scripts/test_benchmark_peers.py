@@ -7,9 +7,9 @@ import pytest
 
 pytest.importorskip("mujoco")
 
-import benchmark_peers
-from peers.tables import engines_table, pairs_table
-from peers.timing import Timing
+from scripts.mujoco import run as benchmark_peers
+from scripts.mujoco.tables import engines_table, pairs_table
+from scripts.mujoco.timing import Timing
 
 SCENARIO = """
 category: cylinder-clutter

@@ -1,13 +1,13 @@
 import sys
 from pathlib import Path
 
-import check_pointing_selection
 import numpy as np
 import pytest
-from check_pointing_selection import best_possible, sample_conditions
 from pr2_reaches import SCENARIO
 
 from lic_drake.reach.pointing_starts import pointing_starts
+from scripts.selection import pr2 as check_pointing_selection
+from scripts.selection.pr2 import best_possible, sample_conditions
 
 STARTS = pointing_starts(SCENARIO, SCENARIO.sample_instance("holdout", 0), SCENARIO.task.stand)
 

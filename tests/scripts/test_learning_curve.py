@@ -1,10 +1,10 @@
 import sys
 from pathlib import Path
 
-import learning_curve
 import pytest
 
-from lic_drake.evaluate.learning import read_learning_curves
+from scripts.learning_curve import run as learning_curve
+from scripts.learning_curve.curve import read_learning_curves
 
 
 def run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:

@@ -1,9 +1,10 @@
 import sys
 from pathlib import Path
 
-import make_figures
 import pytest
 from trial_rows import fill_records
+
+from scripts.tables import figures as make_figures
 
 
 def run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:

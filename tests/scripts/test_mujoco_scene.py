@@ -11,7 +11,8 @@ from lic_drake.scene.scene import SceneConfig
 pytest.importorskip("mujoco")
 
 import mujoco
-from peers.mujoco_scene import MujocoConfig, make_mujoco_scene
+
+from scripts.mujoco.mujoco_scene import MujocoConfig, make_mujoco_scene
 
 BENT = np.deg2rad([-30.0, 60.0, 50.0])
 PARKED = np.deg2rad([-140.0, 100.0, 120.0])

@@ -13,8 +13,8 @@ from lic_drake.scene.scene import SceneConfig
 
 pytest.importorskip("mujoco")
 
-from peers.mujoco_scene import MujocoConfig
-from peers.mujoco_simulation import MujocoSimulation
+from scripts.mujoco.mujoco_scene import MujocoConfig
+from scripts.mujoco.mujoco_simulation import MujocoSimulation
 
 
 def start(scenario: Scenario, environment: int = 0, **config: float | bool) -> MujocoSimulation:

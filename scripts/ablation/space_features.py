@@ -1,0 +1,282 @@
+"""What features and second stages bring to a PR2's estimators, at goals that fits never saw.
+
+One goal of the library after the other is held out, in all environments.
+
+python scripts/ablation/space_features.py --out notebooks/results/ablation/space_features.md
+"""
+
+import argparse
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from lic_drake.errors import LicError
+from lic_drake.estimate.categories import CategoryFeatures, features_of
+from lic_drake.estimate.cross_validation import brier_score, calibration_curve, log_loss
+from lic_drake.estimate.estimator import SuccessEstimator
+from lic_drake.estimate.features import FeatureMap
+from lic_drake.estimate.gaussian_process import GaussianProcess
+from lic_drake.estimate.linear_map import MappedEstimator, can_be_relative
+from lic_drake.estimate.local import LocalEstimator
+from lic_drake.estimate.local_process import choose_process
+from lic_drake.estimate.nearest_neighbours import NearestNeighbours
+from lic_drake.estimate.registry import make_estimator
+from lic_drake.evaluate.statistics import count, mcnemar
+from lic_drake.evaluate.table import Table
+from lic_drake.experience.second_reach import FIRST_PREFIX, SHOWN, pair_reaches
+from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.paths import shipped_library
+from lic_drake.types import Vector
+
+Columns = dict[str, NDArray[Any]]
+
+ESTIMATORS = ("gp", "knn")
+PLAIN, RELATIVE = "goal, start, roll", "relative"
+STACKED, LOCAL, AGAIN = "LIC-2, stacked", "LIC-2, local rows", "LIC-1, away from the failed start"
+SPARSE_BANDWIDTHS = 1.0
+"""Queries further than this from all rows count as sparse, bandwidths of the nearest neighbours."""
+
+
+def plain_first(name: str, features: FeatureMap) -> SuccessEstimator:
+    """Returns LIC-1's estimator on the features as they are, equal ones made equal to the bit."""
+    inner = GaussianProcess() if name == "gp" else NearestNeighbours()
+    return MappedEstimator(inner, np.eye(len(features.names)))
+
+
+def local_second(name: str, features: FeatureMap) -> SuccessEstimator:
+    """Returns LIC-2's estimator as it is for planar arms: local rows of D2."""
+    if name == "gp":
+        return LocalEstimator(choose_process, features.situation, size=800)
+    return LocalEstimator(
+        lambda near: NearestNeighbours(neighbours=400, bandwidth=near.length_scale),
+        features.situation,
+        size=2000,
+    )
+
+
+FIRSTS: dict[str, Callable[[str, FeatureMap], SuccessEstimator]] = {
+    PLAIN: plain_first,
+    RELATIVE: make_estimator,
+}
+SECONDS: dict[str, Callable[[str, FeatureMap], SuccessEstimator]] = {
+    LOCAL: local_second,
+    STACKED: make_estimator,
+}
+
+
+@dataclass
+class HeldOut:
+    """What one estimator made of all goals, each held out once.
+
+    Attributes:
+        probability: LIC-1's estimates of all reaches by features, shape (n,) each.
+        gap: Distance of each reach from the nearest row, in bandwidths, shape (n,) each.
+        won: By features, whether the chosen start of each environment and goal succeeds.
+        second: By strategy, whether the second start succeeds, for each failure of LIC-1.
+        repeated: By strategy, how often it is the failed start if that may be chosen again.
+        random: Success of each other start, on average, for each failure.
+    """
+
+    probability: dict[str, Vector]
+    gap: dict[str, Vector]
+    won: dict[str, list[bool]] = field(default_factory=lambda: {name: [] for name in FIRSTS})
+    second: dict[str, list[bool]] = field(
+        default_factory=lambda: {name: [] for name in ("possible", AGAIN, *SECONDS)}
+    )
+    repeated: dict[str, int] = field(default_factory=lambda: dict.fromkeys(SECONDS, 0))
+    random: list[float] = field(default_factory=list)
+
+
+def goal_of_each(columns: Columns) -> NDArray[np.intp]:
+    """Returns the number of each reach's goal (goal_y, goal_z), shape (n,)."""
+    goals = np.round(np.column_stack([columns["goal_y"], columns["goal_z"]]), 6)
+    goal: NDArray[np.intp] = np.unique(goals, axis=0, return_inverse=True)[1].ravel()
+    return goal
+
+
+def hold_out_goals(name: str, features: CategoryFeatures, columns: Columns) -> HeldOut:
+    """Predicts first and second reaches to each goal from the reaches to the others."""
+    rows, goal = features.first.rows(columns), goal_of_each(columns)
+    n = len(goal)
+    found = HeldOut(
+        {key: np.empty(n) for key in FIRSTS}, {key: np.full(n, np.nan) for key in FIRSTS}
+    )
+    for k in range(int(goal.max()) + 1):
+        out = goal == k
+        for key, make_first in FIRSTS.items():
+            first = make_first(name, features.first)
+            first.fit(rows.Z[~out], rows.f[~out], rows.environment[~out])
+            found.probability[key][out] = first.values(rows.Z[out])
+            found.gap[key][out] = _gap(first, rows.Z[~out], rows.Z[out])
+        pairs = features.second.rows(pair_reaches({key: v[~out] for key, v in columns.items()}))
+        seconds = {
+            key: make_second(name, features.second).fit(pairs.Z, pairs.f, pairs.environment)
+            for key, make_second in SECONDS.items()
+        }
+        for environment in np.unique(rows.environment[out]):
+            here = np.flatnonzero(out & (rows.environment == environment))
+            _choose(found, columns, here, features, seconds)
+        print(f"{name}: {k + 1} of {goal.max() + 1} goals", flush=True)
+    return found
+
+
+def _choose(
+    found: HeldOut,
+    columns: Columns,
+    here: NDArray[np.intp],
+    features: CategoryFeatures,
+    seconds: dict[str, SuccessEstimator],
+) -> None:
+    """Adds the first and second choices among the reaches of one environment and goal."""
+    won = columns["success"][here].astype(bool)
+    for key, probability in found.probability.items():
+        found.won[key].append(bool(won[np.argmax(probability[here])]))
+    lic1 = found.probability[RELATIVE][here]
+    first = int(np.argmax(lic1))
+    if won[first]:
+        return
+    others = np.delete(np.arange(len(here)), first)
+    found.random.append(float(won[others].mean()))
+    found.second["possible"].append(bool(won.any()))
+    found.second[AGAIN].append(bool(won[others[np.argmax(lic1[others])]]))
+    failed = here[first]
+    shown = {FIRST_PREFIX + key: np.full(len(here), columns[key][failed]) for key in SHOWN}
+    Z = features.second.rows({key: v[here] for key, v in columns.items()} | shown).Z
+    for key, second in seconds.items():
+        values = second.values(Z)
+        found.second[key].append(bool(won[others[np.argmax(values[others])]]))
+        found.repeated[key] += int(np.argmax(values) == first)
+
+
+def _gap(estimator: SuccessEstimator, seen: Vector, asked: Vector) -> Vector:
+    """Returns the distance of each query from the nearest row in bandwidths; NaN without any."""
+    assert isinstance(estimator, MappedEstimator)
+    if not isinstance(estimator.inner, NearestNeighbours):
+        return np.full(len(asked), np.nan)
+    scaled = [Z @ estimator.matrix.T / estimator.inner.bandwidth for Z in (seen, asked)]
+    distance: Vector = cKDTree(scaled[0]).query(scaled[1])[0]
+    return distance
+
+
+def first_table(results: dict[str, HeldOut], f: Vector) -> Table:
+    """Returns how good LIC-1's estimates and choices are."""
+    rows = []
+    for name, found in results.items():
+        for key, values in found.probability.items():
+            p = np.clip(values, 0.0, 1.0)
+            test = mcnemar(np.array(found.won[key]), np.array(found.won[RELATIVE]))
+            scores = (f"{brier_score(p, f):.4f}", f"{log_loss(p, f):.3f}")
+            rows.append((name, key, *scores, *_rate(found.won[key]), f"{test:.2g}"))
+    constant = np.full(len(f), f.mean())
+    scores = (f"{brier_score(constant, f):.4f}", f"{log_loss(constant, f):.3f}")
+    rows.append(("overall rate", "", *scores, "", "", "", ""))
+    return Table(
+        caption=f"LIC-1's estimates of {len(f)} reaches to goals that were held out, and the start"
+        " of highest estimate in each environment at each goal.",
+        heading=(
+            *("estimator", "features", "Brier score", "log loss", "chosen start succeeds, %"),
+            *("Wilson 90 % interval", "count", "McNemar's p against relative"),
+        ),
+        rows=tuple(rows),
+    )
+
+
+def second_table(results: dict[str, HeldOut]) -> Table:
+    """Returns how second starts end after LIC-1 with relative features failed."""
+    rows = []
+    for name, found in results.items():
+        failures = len(found.random)
+        for key, won in found.second.items():
+            again = str(found.repeated[key]) if key in found.repeated else ""
+            rows.append((name, key, *_rate(won), again))
+        expected = f"{sum(found.random):.1f}/{failures} expected"
+        rows.append((name, "RND", f"{100 * np.mean(found.random):.1f}", "", expected, ""))
+    return Table(
+        caption="Second starts after LIC-1's failures (relative features), all other starts of the"
+        " environment being there; `possible` is where any of them succeeds.",
+        heading=(
+            *("estimator", "second start", "success, %", "Wilson 90 % interval", "count"),
+            "would repeat the failed start",
+        ),
+        rows=tuple(rows),
+    )
+
+
+def calibration_table(results: dict[str, HeldOut], f: Vector) -> Table:
+    """Returns predicted and observed success, for nearest neighbours also where rows are sparse."""
+    rows = []
+    for name, found in results.items():
+        for key, values in found.probability.items():
+            p, gap = np.clip(values, 0.0, 1.0), found.gap[key]
+            parts = {"": np.ones(len(f), dtype=bool)}
+            if np.all(np.isfinite(gap)):
+                sparse = gap > SPARSE_BANDWIDTHS
+                parts = {"near": ~sparse, "sparse": sparse}
+            for part, among in parts.items():
+                for bin_ in calibration_curve(p[among], f[among], num_bins=5):
+                    successes = round(bin_.observed * bin_.count)
+                    low, high = count(np.arange(bin_.count) < successes).interval()
+                    rows.append(
+                        (
+                            *(name, key, part, f"{bin_.low:.1f}..{bin_.high:.1f}"),
+                            *(f"{bin_.predicted:.3f}", f"{bin_.observed:.3f}"),
+                            *(f"{low:.3f}..{high:.3f}", str(bin_.count)),
+                        )
+                    )
+    return Table(
+        caption="Predicted and observed success at goals that were held out. Nearest neighbours are"
+        f" sparse where no row is within {SPARSE_BANDWIDTHS:g} bandwidth.",
+        heading=(
+            *("estimator", "features", "rows", "prediction", "mean prediction", "observed"),
+            *("Wilson 90 % interval", "reaches"),
+        ),
+        rows=tuple(rows),
+    )
+
+
+def _rate(won: list[bool]) -> tuple[str, str, str]:
+    result = count(np.array(won))
+    low, high = result.interval()
+    return (
+        f"{100 * result.rate:.1f}",
+        f"{100 * low:.1f}..{100 * high:.1f}",
+        f"{result.successes}/{result.trials}",
+    )
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--library", type=Path, default=shipped_library("sphere-aperture-clutter"))
+    parser.add_argument("--out", type=Path, required=True, help="Markdown file")
+    args = parser.parse_args()
+    try:
+        columns = ExperienceLibrary(args.library).columns()
+        features = features_of(str(columns["category"][0]))
+        if not can_be_relative(features.first):
+            raise LicError(f"features of {columns['category'][0]} cannot be relative in space")
+        results = {name: hold_out_goals(name, features, columns) for name in ESTIMATORS}
+    except LicError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    f = columns["success"].astype(float)
+    goals, environments = goal_of_each(columns).max() + 1, len(np.unique(columns["environment"]))
+    tables = (first_table(results, f), second_table(results), calibration_table(results, f))
+    text = (
+        "# Features and second stages of the PR2's estimators\n\n"
+        f"Made by `python scripts/ablation/space_features.py --out {args.out}` from"
+        f" {len(f)} reaches in {environments} environments: {goals} folds, each without one"
+        " goal.\n\n"
+    )
+    args.out.parent.mkdir(parents=True, exist_ok=True)
+    args.out.write_text(text + "\n".join(t.to_markdown() for t in tables), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

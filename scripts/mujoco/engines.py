@@ -1,0 +1,55 @@
+"""The engines that are compared: Drake as the package uses it, and MuJoCo."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.reach.environment import Environment, simulate
+from lic_drake.reach.request import ReachRequest
+from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.trace import ReachResult
+from scripts.mujoco.mujoco_scene import MujocoConfig
+from scripts.mujoco.mujoco_simulation import MujocoSimulation
+
+
+@dataclass(frozen=True, kw_only=True)
+class Engine:
+    """A simulator and how it is used; plain data that pickles.
+
+    Attributes:
+        name: Heading in the tables.
+        mujoco: How MuJoCo simulates; None for Drake.
+        time_step_s: Step of Drake's plant, seconds; None for what the scenario says.
+        sleep: Whether objects sleep in Drake until the arm comes near.
+    """
+
+    name: str
+    mujoco: MujocoConfig | None = None
+    time_step_s: float | None = None
+    sleep: bool = True
+
+    def prepare(
+        self, scenario: Scenario, instance: ClutterInstance
+    ) -> Callable[[ReachRequest], ReachResult]:
+        """Builds an environment.
+
+        Returns:
+            A function that simulates a reach in it; start and goal must be within reach.
+        """
+        if self.mujoco is not None:
+            simulation = MujocoSimulation(scenario, instance, self.mujoco)
+            arm = scenario.arm()
+            return lambda request: simulate(
+                simulation,
+                scenario,
+                arm.solve_ik(np.array(request.start)),
+                np.array(request.goal),
+            )
+        if self.time_step_s is not None:
+            scenario = replace(
+                scenario, scene=replace(scenario.scene, time_step_s=self.time_step_s)
+            )
+        environment = Environment(scenario, instance, sleep=self.sleep)
+        return lambda request: environment.reach(np.array(request.goal), np.array(request.start))

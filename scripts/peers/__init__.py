@@ -1,1 +1,0 @@
-"""The same reaches in other simulators, for `scripts/benchmark_peers.py`."""

@@ -1,0 +1,59 @@
+"""Draws Figs. 5 and 6: two attempts of LIC in time, and what LIC-1 and LIC-2 made of the starts.
+
+Takes the first recorded trial whose first attempt failed and whose second succeeded.
+
+python scripts/tables/figures_5_and_6.py
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+from lic_drake.errors import LicError
+from lic_drake.evaluate.trial import run_trial
+from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.paths import shipped_library
+from lic_drake.reach.starts import make_starts
+from lic_drake.select.lic import LicSelector
+from lic_drake.select.registry import make_selector
+from lic_drake.show.attempt_figures import densities_figure, snapshots_figure
+from lic_drake.show.plots import save_figure
+from scripts.common import RESULTS, load_trials
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--category", default="cylinder-clutter")
+    parser.add_argument("--method", default="gp")
+    parser.add_argument("--results", type=Path, default=RESULTS, help="folder of all records")
+    args = parser.parse_args()
+    try:
+        trials = load_trials(args.results, args.category).trials(args.method)
+        library = ExperienceLibrary(shipped_library(args.category))
+        scenario = library.scenario()
+    except LicError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    environment, goal = next(
+        pair for pair, rows in trials.items() if len(rows) == 2 and rows[1].success
+    )
+    p_WG = scenario.sample_goal("evaluation", environment, goal)
+    selector = make_selector(args.method, scenario.arm(), library.columns(), category=args.category)
+    if not isinstance(selector, LicSelector):
+        parser.error(f"the figures show what LIC estimates; {args.method!r} estimates nothing")
+    attempts = run_trial(scenario, selector, "evaluation", environment, p_WG, attempts=2)
+    starts = make_starts(scenario, scenario.sample_instance("evaluation", environment))
+    folder = args.results / "figures"
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, figure in (
+        ("figure_5", snapshots_figure(attempts)),
+        ("figure_6", densities_figure(selector, starts, p_WG, attempts)),
+    ):
+        path = folder / f"{name}_{args.category}.png"
+        save_figure(figure, path)
+        print(path)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
