@@ -6,7 +6,6 @@ another system's port, or an id object that a plant has returned.
 
 import gc
 import os
-import sys
 import weakref
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -15,11 +14,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-
-from reaches import free_space, reach_request, small_clutter
-from worlds import box, cylinder, make_clutter
+from support.reaches import free_space, reach_request, small_clutter
+from support.worlds import box, cylinder, make_clutter
 
 from lic_drake.control.mpc import HapticMpc
 from lic_drake.evaluate.batch import random_requests

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import nbformat
 import pytest
-from browser import assert_shows_a_scene, visit
 from nbclient import NotebookClient
-from trial_rows import fill_records
+from support.browser import assert_shows_a_scene, visit
+from support.trial_rows import fill_records
 
 from lic_drake.evaluate.paper import REMARKS, TABLES
 

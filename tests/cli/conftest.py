@@ -1,13 +1,9 @@
-"""Makes the module `fake_reach` importable, and a library that it filled."""
+"""A library that `fake_reach` filled."""
 
-import sys
 from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from fake_reach import fill_library
+from support.fake_reach import fill_library
 
 
 @pytest.fixture

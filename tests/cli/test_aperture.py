@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fake_reach import FakeReach, make_record, make_request
+from support.fake_reach import FakeReach, make_record, make_request
 
 import lic_drake.experience.collect as dut
 from lic_drake.cli.main import main

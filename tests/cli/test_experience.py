@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from fake_reach import make_request
+from support.fake_reach import make_request
 
 from lic_drake.cli.main import main
 from lic_drake.experience.grid import REQUEST_FILE, write_request

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from fake_reach import FakeReach, make_record, make_request
+from support.fake_reach import FakeReach, make_record, make_request
 
 import lic_drake.experience.collect as dut
 from lic_drake.cli.main import main

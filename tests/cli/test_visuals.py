@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from mesh_package import go_offline, write_drake_models
+from support.mesh_package import go_offline, write_drake_models
 
 from lic_drake.cli.main import main
 from lic_drake.show import demonstration

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.distance import pdist
 from scipy.stats import ks_2samp
-from worlds import corners
+from support.worlds import corners
 
 from lic_drake.clutter.aperture import MAX_APERTURES, CylinderApertureClutter
 from lic_drake.clutter.cylinder import CylinderClutter

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import kstest
-from worlds import corners
+from support.worlds import corners
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.clutter.passage import PassageClutter

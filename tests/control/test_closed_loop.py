@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
-from reaches import start_context
-from worlds import ARM, LAYOUT, cylinder, make_clutter
+from support.reaches import start_context
+from support.worlds import ARM, LAYOUT, cylinder, make_clutter
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.reach.diagram import make_reach_diagram

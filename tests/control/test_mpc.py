@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from optimality import kkt_residual, largest_margin, violation
 from scipy.optimize import fsolve
-from worlds import ARM, LAYOUT
+from support.optimality import kkt_residual, largest_margin, violation
+from support.worlds import ARM, LAYOUT
 
 from lic_drake.control.mpc import HapticMpc, MpcInput
 from lic_drake.control.mpc_config import MpcConfig, haptic_mpc_2013, ijrr_2013

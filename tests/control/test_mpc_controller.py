@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
-from worlds import ARM, LAYOUT
+from support.worlds import ARM, LAYOUT
 
 from lic_drake.control.mpc import HapticMpc, MpcInput
 from lic_drake.control.mpc_config import MpcConfig, haptic_mpc_2013, ijrr_2013

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from worlds import ARM, LAYOUT, World, add_sensor, cylinder, make_clutter, make_world
+from support.worlds import ARM, LAYOUT, World, add_sensor, cylinder, make_clutter, make_world
 
 from lic_drake.control.mpc import HapticMpc, MpcInput
 from lic_drake.control.mpc_config import haptic_mpc_2013

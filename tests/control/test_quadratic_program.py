@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from optimality import kkt_residual, largest_margin, violation
 from pydrake.solvers import ClarabelSolver, MathematicalProgram, SnoptSolver, SolverInterface
+from support.optimality import kkt_residual, largest_margin, violation
 
 from lic_drake.control.quadratic_program import QuadraticProgram, solve
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from pr2_reaches import ARM, SCENARIO, felt, spheres
+from support.pr2_reaches import ARM, SCENARIO, felt, spheres
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.control.surface_taxels import make_taxels

@@ -20,7 +20,7 @@ from pydrake.multibody.plant import (
 )
 from pydrake.multibody.tree import SpatialInertia, UnitInertia
 from pydrake.systems.framework import DiagramBuilder
-from worlds import ARM, LAYOUT, World, add_sensor, box, cylinder, make_clutter, make_world
+from support.worlds import ARM, LAYOUT, World, add_sensor, box, cylinder, make_clutter, make_world
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.control.tactile_sensor import read_patches

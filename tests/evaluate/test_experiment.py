@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fake_reach import comparable, make_record, make_request
+from support.fake_reach import comparable, make_record, make_request
 
 from lic_drake.errors import LibraryError, RequestError
 from lic_drake.evaluate import experiment as dut

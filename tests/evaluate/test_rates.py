@@ -1,6 +1,6 @@
 from math import isnan
 
-from trial_rows import make_rows
+from support.trial_rows import make_rows
 
 from lic_drake.evaluate.rates import format_rates, summarize_trials
 from lic_drake.evaluate.trials import TrialTable

@@ -1,7 +1,7 @@
 import re
 
 import pytest
-from trial_rows import make_rows, paper_rows
+from support.trial_rows import make_rows, paper_rows
 
 from lic_drake.errors import LibraryError
 from lic_drake.evaluate.paper import TABLE_I, TABLE_III, TABLE_IV, TABLES, PaperTable

@@ -2,7 +2,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
-from fake_reach import make_record
+from support.fake_reach import make_record
 
 from lic_drake.evaluate.trial import run_trial
 from lic_drake.reach.request import ReachRecord, ReachRequest

@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from trial_rows import make_rows
+from support.trial_rows import make_rows
 
 from lic_drake.errors import LibraryError
 from lic_drake.evaluate.trials import SCHEMA, TrialRow, TrialTable, read_trials, write_trials

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from fake_reach import fill_library
+from support.fake_reach import fill_library
 
 from lic_drake.errors import LibraryError
 from lic_drake.experience.added import (

@@ -10,9 +10,9 @@ import pytest
 
 pytest.importorskip("distributed", reason="Dask is missing: pip install 'lic_drake[cluster]'")
 
-from collecting import Start, check, collections, wait_until
-from dask_cluster import DaskCluster, dask_cluster
-from fake_reach import (
+from support.collecting import Start, check, collections, wait_until
+from support.dask_cluster import DaskCluster, dask_cluster
+from support.fake_reach import (
     FakeReach,
     ThreadCountingReach,
     comparable,
@@ -174,7 +174,7 @@ def test_a_worker_with_several_threads_is_refused(
 def test_a_worker_with_another_lic_drake_is_refused(
     dask: DaskCluster, library: ExperienceLibrary, reach: FakeReach
 ) -> None:
-    worker = dask.add_workers(1, module="strange_dask_worker")
+    worker = dask.add_workers(1, module="support.strange_dask_worker")
     with pytest.raises(ClusterError, match=r"lacks lic_drake .* \(it has: 0.0.1\); install"):
         run(dask, library, reach)
     dask.remove(worker)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fake_reach import FakeReach, comparable, expected_records, make_record, make_request
+from support.fake_reach import FakeReach, comparable, expected_records, make_record, make_request
 
 from lic_drake.errors import LibraryError
 from lic_drake.experience import collect as dut

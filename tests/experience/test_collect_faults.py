@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from collecting import Start, check, collections, is_alive, wait_until
-from fake_reach import (
+from support.collecting import Start, check, collections, is_alive, wait_until
+from support.fake_reach import (
     FakeReach,
     ThreadCountingReach,
     comparable,

@@ -4,9 +4,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from fake_reach import make_request
 from hypothesis import given
 from hypothesis import strategies as st
+from support.fake_reach import make_request
 
 from lic_drake.errors import LibraryError, RequestError
 from lic_drake.experience.grid import CollectionRequest, read_request, write_request

@@ -3,7 +3,7 @@ import threading
 from pathlib import Path
 
 import pytest
-from fake_reach import comparable, make_record, make_request
+from support.fake_reach import comparable, make_record, make_request
 
 from lic_drake.errors import LibraryError
 from lic_drake.experience.journal import Journal, JournalTail, read_journal

@@ -2,7 +2,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from fake_reach import comparable, expected_records, make_record, make_request
+from support.fake_reach import comparable, expected_records, make_record, make_request
 
 from lic_drake.errors import LibraryError
 from lic_drake.experience.merge import merge_libraries

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fake_reach import make_record, make_request
+from support.fake_reach import make_record, make_request
 
 from lic_drake.errors import LibraryError
 from lic_drake.experience.real_pairs import pair_real_attempts

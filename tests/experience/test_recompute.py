@@ -3,7 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fake_reach import fill_library, make_record
+from support.fake_reach import fill_library, make_record
 
 from lic_drake.cli.main import main
 from lic_drake.errors import LibraryError

@@ -8,9 +8,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from fake_reach import make_record, make_request
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from support.fake_reach import make_record, make_request
 
 from lic_drake.errors import LibraryError
 from lic_drake.experience.schema import (

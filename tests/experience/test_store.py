@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from fake_reach import comparable, make_record, make_request
+from support.fake_reach import comparable, make_record, make_request
 
 from lic_drake.errors import LibraryError
 from lic_drake.experience.grid import REQUEST_FILE, write_request

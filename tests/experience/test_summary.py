@@ -2,8 +2,8 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from fake_reach import make_record, make_request
 from scipy.stats import binomtest
+from support.fake_reach import make_record, make_request
 
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.experience.summary import summarize

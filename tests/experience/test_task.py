@@ -5,7 +5,7 @@ from pathlib import Path
 from socket import gethostname
 
 import pytest
-from fake_reach import FakeReach, comparable, make_record, make_request
+from support.fake_reach import FakeReach, comparable, make_record, make_request
 
 from lic_drake.errors import LibraryError
 from lic_drake.experience.store import ExperienceLibrary

@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ray_casting import OTHER, blank, draw_boxes, draw_instance, tilted
+from support.ray_casting import OTHER, blank, draw_boxes, draw_instance, tilted
 
 from lic_drake.clutter.foliage import FoliageApertureClutter
 from lic_drake.clutter.instance import ClutterInstance

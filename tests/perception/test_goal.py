@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from ray_casting import OTHER, blank, draw_ball, draw_boxes, tilted
+from support.ray_casting import OTHER, blank, draw_ball, draw_boxes, tilted
 
 from lic_drake.errors import PerceptionError
 from lic_drake.perception.config import CameraConfig, PoseErrorConfig

@@ -1,7 +1,7 @@
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from ray_casting import blank, tilted
+from support.ray_casting import blank, tilted
 
 
 @given(st.floats(-60, 60), st.floats(-180, 180), st.integers(0, 319), st.integers(0, 239))

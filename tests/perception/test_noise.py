@@ -2,8 +2,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ray_casting import blank, tilted
 from scipy.spatial.transform import Rotation
+from support.ray_casting import blank, tilted
 
 from lic_drake.perception.config import CameraConfig, NoiseConfig, PoseErrorConfig
 from lic_drake.perception.noise import (

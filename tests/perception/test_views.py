@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ray_casting import blank, draw_ball, draw_instance, tilted
+from support.ray_casting import blank, draw_ball, draw_instance, tilted
 
 from lic_drake.clutter.foliage import FoliageApertureClutter
 from lic_drake.perception.apertures import BoardModel, find_apertures

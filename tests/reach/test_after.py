@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fake_reach import comparable
-from reaches import assert_never_began, reach_request, small_clutter
+from support.fake_reach import comparable
+from support.reaches import assert_never_began, reach_request, small_clutter
 
 from lic_drake.experience.schema import make_header, read_table, to_records, to_table, write_table
 from lic_drake.reach import rollout as dut

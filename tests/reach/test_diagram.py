@@ -3,8 +3,8 @@ import pytest
 from pydrake.geometry import Meshcat
 from pydrake.multibody.tree import JointIndex
 from pydrake.systems.analysis import Simulator
-from reaches import start_angles, start_context
-from worlds import box, cylinder, make_clutter
+from support.reaches import start_angles, start_context
+from support.worlds import box, cylinder, make_clutter
 
 from lic_drake.control.taxels import planar_taxels
 from lic_drake.reach.diagram import ReachDiagram, make_reach_diagram

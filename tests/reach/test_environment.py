@@ -2,8 +2,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from reaches import free_space, reach_request, small_clutter, start_angles
-from worlds import box, cylinder, make_clutter
+from support.reaches import free_space, reach_request, small_clutter, start_angles
+from support.worlds import box, cylinder, make_clutter
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.reach.environment import Environment

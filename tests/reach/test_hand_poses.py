@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from starts import APERTURES, ARM, LINE, hand_pose_by_drake
+from support.starts import APERTURES, ARM, LINE, hand_pose_by_drake
 
 from lic_drake.reach.hand_poses import HandPoses
 

@@ -6,7 +6,7 @@ import itertools
 import numpy as np
 import pytest
 import yaml
-from worlds import ARM, corners, gap_to_boxes
+from support.worlds import ARM, corners, gap_to_boxes
 
 from lic_drake.errors import RequestError
 from lic_drake.experience.store import ExperienceLibrary

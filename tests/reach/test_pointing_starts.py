@@ -2,8 +2,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pr2_reaches import SCENARIO
-from pr2_reference import link_poses
+from support.pr2_reaches import SCENARIO
+from support.pr2_reference import link_poses
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import ScenarioError

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fake_reach import comparable
-from pr2_reaches import ARM, SCENARIO, pr2_of, spheres
+from support.fake_reach import comparable
+from support.pr2_reaches import ARM, SCENARIO, pr2_of, spheres
 
 from lic_drake.errors import RequestError, ScenarioError
 from lic_drake.experience.grid import CollectionRequest

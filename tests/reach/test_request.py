@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fake_reach import make_record
-from reaches import reach_request
+from support.fake_reach import make_record
+from support.reaches import reach_request
 
 from lic_drake.errors import RequestError
 from lic_drake.experience.schema import to_records

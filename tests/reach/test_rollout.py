@@ -5,15 +5,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fake_reach import comparable
-from reaches import (
+from support.fake_reach import comparable
+from support.reaches import (
     assert_never_began,
     free_space,
     reach_request,
     small_clutter,
     start_angles,
 )
-from worlds import box, cylinder, make_clutter
+from support.worlds import box, cylinder, make_clutter
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.reach import rollout as dut

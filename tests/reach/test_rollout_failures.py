@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
-from reaches import assert_never_began, free_space, reach_request, small_clutter
+from support.reaches import assert_never_began, free_space, reach_request, small_clutter
 
 from lic_drake.control import tactile_sensor
 from lic_drake.control.mpc import HapticMpc

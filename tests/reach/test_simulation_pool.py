@@ -2,8 +2,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fake_reach import comparable
-from reaches import free_space, reach_request, small_clutter
+from support.fake_reach import comparable
+from support.reaches import free_space, reach_request, small_clutter
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.evaluate.batch import random_requests

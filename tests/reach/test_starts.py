@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import ks_2samp
-from starts import APERTURES, ARM, LINE, aperture_starts, assert_possible, dense_scan
-from worlds import gap_to_boxes
+from support.starts import APERTURES, ARM, LINE, aperture_starts, assert_possible, dense_scan
+from support.worlds import gap_to_boxes
 
 from lic_drake.errors import RequestError
 from lic_drake.reach.environment import Environment

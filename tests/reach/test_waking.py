@@ -2,9 +2,9 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from fake_reach import comparable
-from reaches import MEASURED, free_space, reach_request, start_angles
-from worlds import box, cylinder, make_clutter
+from support.fake_reach import comparable
+from support.reaches import MEASURED, free_space, reach_request, start_angles
+from support.worlds import box, cylinder, make_clutter
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.evaluate.batch import random_requests

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pr2_reference import FACTS, link_poses, mass_matrix
 from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.math import SpatialForce
@@ -16,6 +15,7 @@ from pydrake.multibody.plant import (
 from pydrake.multibody.tree import FixedOffsetFrame
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from support.pr2_reference import FACTS, link_poses, mass_matrix
 
 from lic_drake.errors import ScenarioError
 from lic_drake.robots.arm import Arm

@@ -3,11 +3,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from pr2_reference import BODIES, FACTS
 from pydrake.geometry import Box, Cylinder, SceneGraph
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
+from support.pr2_reference import BODIES, FACTS
 
 from lic_drake.robots.pr2_description import (
     LEFT_ARM_AT_REST,

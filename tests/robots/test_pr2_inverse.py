@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from pr2_reference import link_poses
+from support.pr2_reference import link_poses
 
 from lic_drake.robots.pr2 import Pr2Arm
 from lic_drake.robots.pr2_inverse import (

@@ -3,7 +3,7 @@ import pytest
 from pydrake.geometry import TriangleSurfaceMesh, VolumeMesh
 from pydrake.multibody.plant import CalcContactFrictionFromSurfaceProperties, ContactResults
 from pydrake.systems.analysis import ApplySimulatorConfig, SimulatorConfig
-from worlds import ARM, World, box, cylinder, gap_to_boxes, make_clutter, make_world
+from support.worlds import ARM, World, box, cylinder, gap_to_boxes, make_clutter, make_world
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.scene.contact import ContactConfig, object_properties, skin_properties

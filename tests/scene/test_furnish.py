@@ -1,5 +1,5 @@
 import numpy as np
-from worlds import box, cylinder, make_clutter
+from support.worlds import box, cylinder, make_clutter
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.reach.diagram import ReachDiagram, make_reach_diagram

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from worlds import box, cylinder, make_clutter, make_world
+from support.worlds import box, cylinder, make_clutter, make_world
 
 from lic_drake.scene.scene import SceneConfig
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from worlds import ARM, make_clutter, make_world
+from support.worlds import ARM, make_clutter, make_world
 
 from lic_drake.scene.scene import SceneConfig
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from pydrake.systems.analysis import ApplySimulatorConfig, SimulatorConfig
-from worlds import World, make_clutter, make_world
+from support.worlds import World, make_clutter, make_world
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.scene.movables import CARRIAGE_SHARE

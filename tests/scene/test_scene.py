@@ -3,7 +3,7 @@ import pytest
 from pydrake.geometry import Box, Cylinder, Role, Sphere
 from pydrake.systems.analysis import ApplySimulatorConfig, SimulatorConfig
 from pydrake.systems.framework import DiagramBuilder
-from worlds import ARM, box, cylinder, make_clutter, make_world
+from support.worlds import ARM, box, cylinder, make_clutter, make_world
 
 from lic_drake.scene.scene import SceneConfig, add_scene, make_shape
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse.csgraph import shortest_path
-from worlds import ARM, box, cylinder, make_clutter, make_world
+from support.worlds import ARM, box, cylinder, make_clutter, make_world
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.clutter.placement import place_discs

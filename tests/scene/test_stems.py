@@ -7,7 +7,7 @@ import pytest
 from pydrake.geometry import QueryObject
 from pydrake.systems.analysis import ApplySimulatorConfig, SimulatorConfig
 from scipy.optimize import brentq
-from worlds import ARM, World, add_sensor, make_clutter, make_world
+from support.worlds import ARM, World, add_sensor, make_clutter, make_world
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.clutter.stems import Stems

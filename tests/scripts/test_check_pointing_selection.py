@@ -3,7 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pr2_reaches import SCENARIO
+from support.pr2_reaches import SCENARIO
 
 from lic_drake.reach.pointing_starts import pointing_starts
 from scripts.selection import pr2 as check_pointing_selection

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from trial_rows import fill_records, make_rows
+from support.trial_rows import fill_records, make_rows
 
 from lic_drake.errors import LibraryError
 from lic_drake.evaluate.paper import TABLES

@@ -2,7 +2,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from trial_rows import fill_records
+from support.trial_rows import fill_records
 
 from scripts.tables import figures as make_figures
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
-from select_surfaces import Bumps, random_model
-from starts import ARM, LINE
+from support.select_surfaces import Bumps, random_model
+from support.starts import ARM, LINE
 
 from lic_drake.errors import RequestError
 from lic_drake.estimate.categories import features_of

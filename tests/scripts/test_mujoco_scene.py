@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from worlds import ARM, World, box, cylinder, make_clutter, make_world
+from support.worlds import ARM, World, box, cylinder, make_clutter, make_world
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import ScenarioError

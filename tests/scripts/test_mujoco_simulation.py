@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from reaches import free_space, reach_request, small_clutter, start_angles
-from worlds import ARM, add_sensor, cylinder, make_clutter, make_world
+from support.reaches import free_space, reach_request, small_clutter, start_angles
+from support.worlds import ARM, add_sensor, cylinder, make_clutter, make_world
 
 from lic_drake.reach.environment import simulate
 from lic_drake.reach.rollout import environment_of

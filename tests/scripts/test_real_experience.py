@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fake_reach import make_record
 from matplotlib.figure import Figure
+from support.fake_reach import make_record
 
 from lic_drake.errors import LibraryError
 from lic_drake.evaluate import experiment

@@ -1,7 +1,7 @@
 from pathlib import Path
 
 import pytest
-from trial_rows import fill_records
+from support.trial_rows import fill_records
 
 from lic_drake.errors import LibraryError
 from scripts.common import (

@@ -1,5 +1,5 @@
 import pytest
-from trial_rows import make_rows
+from support.trial_rows import make_rows
 
 from lic_drake.evaluate.statistics import mcnemar
 from lic_drake.evaluate.trials import TrialTable

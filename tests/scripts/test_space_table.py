@@ -1,7 +1,7 @@
 from dataclasses import replace
 
 import numpy as np
-from trial_rows import make_rows
+from support.trial_rows import make_rows
 
 from lic_drake.evaluate.statistics import mcnemar
 from lic_drake.evaluate.trials import TrialTable

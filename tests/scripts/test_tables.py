@@ -1,6 +1,6 @@
 from pathlib import Path
 
-from trial_rows import fill_records
+from support.trial_rows import fill_records
 
 from scripts.common import write_tables
 

@@ -3,8 +3,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fake_reach import make_record
-from fake_reach import make_request as make_collection
+from support.fake_reach import make_record
+from support.fake_reach import make_request as make_collection
 
 from lic_drake.errors import RequestError
 from lic_drake.evaluate.trials import read_trials

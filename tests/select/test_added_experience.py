@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from fake_reach import fill_library
-from select_surfaces import Bumps
-from starts import ARM
+from support.fake_reach import fill_library
+from support.select_surfaces import Bumps
+from support.starts import ARM
 
 from lic_drake.estimate.checks import EstimateError
 from lic_drake.estimate.features import PLANAR_LIC1

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydrake.math import RollPitchYaw, RotationMatrix
 from scipy.stats import chisquare
-from starts import APERTURES, LINE
+from support.starts import APERTURES, LINE
 
 from lic_drake.errors import RequestError
 from lic_drake.reach.initial_conditions import InitialConditions

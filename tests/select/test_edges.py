@@ -1,5 +1,5 @@
 import numpy as np
-from select_surfaces import random_bumps
+from support.select_surfaces import random_bumps
 
 from lic_drake.estimate.features import PLANAR_LIC1
 from lic_drake.reach.hand_poses import HandPoses

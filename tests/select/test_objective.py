@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from select_surfaces import random_model
+from support.select_surfaces import random_model
 
 from lic_drake.estimate.categories import features_of
 from lic_drake.estimate.features import FeatureMap

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
-from select_surfaces import Bumps, random_bumps, random_model
-from starts import APERTURES, ARM, LINE, aperture_starts, assert_possible, dense_scan
+from support.select_surfaces import Bumps, random_bumps, random_model
+from support.starts import APERTURES, ARM, LINE, aperture_starts, assert_possible, dense_scan
 
 from lic_drake.errors import RequestError
 from lic_drake.estimate.categories import features_of

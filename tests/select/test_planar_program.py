@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 from pydrake.autodiffutils import AutoDiffXd, InitializeAutoDiff
-from select_surfaces import Bumps, random_model
-from starts import APERTURES, ARM, LINE
+from support.select_surfaces import Bumps, random_model
+from support.starts import APERTURES, ARM, LINE
 
 from lic_drake.estimate.features import PLANAR_LIC1
 from lic_drake.select.objective import Objective, SuccessModel

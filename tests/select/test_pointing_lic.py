@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
-from pr2_reaches import SCENARIO
-from pr2_reference import link_poses
+from support.pr2_reaches import SCENARIO
+from support.pr2_reference import link_poses
 
 from lic_drake.errors import RequestError
 from lic_drake.estimate.categories import features_of

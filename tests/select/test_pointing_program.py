@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from pr2_reaches import SCENARIO
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, InitializeAutoDiff
+from support.pr2_reaches import SCENARIO
 
 from lic_drake.estimate.features import SPACE_LIC1
 from lic_drake.reach.pointing_starts import PointingStarts

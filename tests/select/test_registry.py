@@ -2,8 +2,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fake_reach import fill_library
-from starts import ARM, LINE
+from support.fake_reach import fill_library
+from support.starts import ARM, LINE
 
 from lic_drake.errors import RequestError
 from lic_drake.experience.store import ExperienceLibrary

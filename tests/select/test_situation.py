@@ -2,11 +2,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fake_reach import make_record
 from hypothesis import given
 from hypothesis import strategies as st
-from reaches import reach_request
-from starts import APERTURES, LINE
+from support.fake_reach import make_record
+from support.reaches import reach_request
+from support.starts import APERTURES, LINE
 
 from lic_drake.errors import RequestError
 from lic_drake.reach.initial_conditions import InitialConditions

@@ -2,7 +2,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from pr2_reaches import SCENARIO
+from support.pr2_reaches import SCENARIO
 
 from lic_drake.reach.pointing_starts import mobile_positions, pointing_starts
 from lic_drake.show.approach import RETREAT_STEP_M, WAITING_DEG, plan_approach

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fake_reach import make_record, make_request
+from support.fake_reach import make_record, make_request
 
 from lic_drake.errors import LicError, RequestError
 from lic_drake.experience.store import ExperienceLibrary

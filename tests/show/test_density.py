@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
-from select_surfaces import random_model
-from starts import APERTURES, ARM, LINE
+from support.select_surfaces import random_model
+from support.starts import APERTURES, ARM, LINE
 
 from lic_drake.reach.starts import ApertureStarts, LineStarts
 from lic_drake.select.planar_lic import PlanarLic

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 from pydrake.systems.framework import Diagram
-from worlds import cylinder, make_clutter
+from support.worlds import cylinder, make_clutter
 
 from lic_drake.errors import LicError
 from lic_drake.reach.diagram import make_reach_diagram

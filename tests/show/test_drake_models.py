@@ -8,8 +8,8 @@ import time
 from pathlib import Path
 
 import pytest
-from mesh_package import go_offline, write_drake_models
 from pydrake.common import FindResourceOrThrow
+from support.mesh_package import go_offline, write_drake_models
 
 from lic_drake.errors import ModelError
 from lic_drake.show.drake_models import find_drake_models, runs_in_time

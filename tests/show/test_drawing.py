@@ -3,7 +3,7 @@ import pytest
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, Polygon
-from ray_casting import blank, tilted
+from support.ray_casting import blank, tilted
 
 from lic_drake.perception.apertures import DetectedApertures
 from lic_drake.perception.goal import DetectedGoal

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import assert_shows_a_scene, visit
-from reaches import reach_request, small_clutter
+from support.browser import assert_shows_a_scene, visit
+from support.reaches import reach_request, small_clutter
 
 from lic_drake.errors import LicError
 from lic_drake.reach.rollout import instance_of, simulate_request

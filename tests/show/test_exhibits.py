@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
-from browser import assert_shows_a_scene, visit
+from support.browser import assert_shows_a_scene, visit
 
 from lic_drake.cli.main import main
 from lic_drake.experience.store import ExperienceLibrary

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fake_reach import make_record
+from support.fake_reach import make_record
 
 from lic_drake.evaluate.experiment import Evaluation, run_evaluation
 from lic_drake.experience.grid import REQUEST_FILE, CollectionRequest, write_request

@@ -4,9 +4,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mesh_package import write_drake_models
 from pydrake.geometry import Mesh, Role
 from pydrake.systems.framework import DiagramBuilder
+from support.mesh_package import write_drake_models
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.robots.pr2 import Pr2Arm

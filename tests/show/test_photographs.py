@@ -3,12 +3,12 @@ sensor."""
 
 import numpy as np
 import pytest
-from browser import hue_share
-from pr2_reaches import ARM as PR2
-from pr2_reaches import SCENARIO as SPHERES
-from pr2_reaches import felt, spheres
-from reaches import free_space
-from worlds import ARM, cylinder, make_clutter
+from support.browser import hue_share
+from support.pr2_reaches import ARM as PR2
+from support.pr2_reaches import SCENARIO as SPHERES
+from support.pr2_reaches import felt, spheres
+from support.reaches import free_space
+from support.worlds import ARM, cylinder, make_clutter
 
 from lic_drake.reach.trace import SceneState
 from lic_drake.show.photographs import Photograph, Photographer

@@ -8,8 +8,8 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.patches import Circle, Polygon, Rectangle
-from reaches import free_space
-from worlds import ARM, box, corners, cylinder, make_clutter
+from support.reaches import free_space
+from support.worlds import ARM, box, corners, cylinder, make_clutter
 
 from lic_drake.errors import LicError
 from lic_drake.reach.scenario import load_scenario

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fake_reach import make_record
-from mesh_package import write_drake_models
+from support.fake_reach import make_record
+from support.mesh_package import write_drake_models
 
 from lic_drake.evaluate.experiment import Evaluation, run_evaluation
 from lic_drake.experience.grid import REQUEST_FILE, CollectionRequest, write_request

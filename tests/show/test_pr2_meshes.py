@@ -2,7 +2,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mesh_package import write_drake_models
+from support.mesh_package import write_drake_models
 
 from lic_drake.errors import ModelError
 from lic_drake.show.pr2_meshes import DESCRIPTION, read_pr2_meshes

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import assert_shows_a_scene, hue_share, visit
-from reaches import free_space, reach_request, small_clutter
-from worlds import cylinder, make_clutter
+from support.browser import assert_shows_a_scene, hue_share, visit
+from support.reaches import free_space, reach_request, small_clutter
+from support.worlds import cylinder, make_clutter
 
 from lic_drake.errors import LicError
 from lic_drake.reach.environment import Environment

@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.image import imread
-from reaches import reach_request, small_clutter
+from support.reaches import reach_request, small_clutter
 
 from lic_drake.errors import RenderingError
 from lic_drake.evaluate.trial import Attempt

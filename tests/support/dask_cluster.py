@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from collecting import environment, wait_until
+from support.collecting import environment, wait_until
 
 Process = subprocess.Popen[bytes]
 

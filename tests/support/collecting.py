@@ -13,7 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from fake_reach import FakeReach
+from support.fake_reach import FakeReach
 
 TESTS = Path(__file__).parent
 OPTIONS = ("--environments", "3", "--max-goals", "4", "--max-starts", "3")
@@ -22,7 +22,7 @@ OPTIONS = ("--environments", "3", "--max-goals", "4", "--max-starts", "3")
 SCRIPT = """
 import pickle, sys
 from functools import partial
-from fake_reach import limit_files
+from support.fake_reach import limit_files
 from lic_drake.cli.main import main
 import lic_drake.experience.collect as module
 reach, fatal_bytes = pickle.loads(bytes.fromhex(sys.argv[1]))

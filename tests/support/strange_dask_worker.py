@@ -1,4 +1,4 @@
-"""A Dask worker on a machine with another lic_drake: python -m strange_dask_worker ADDRESS ..."""
+"""A Dask worker on a machine with another lic_drake, for tests that refuse it."""
 
 import importlib.metadata
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import expm
 
-FACTS = json.loads((Path(__file__).parent / "data" / "pr2_facts.json").read_text())
+FACTS = json.loads((Path(__file__).parents[1] / "data" / "pr2_facts.json").read_text())
 BODIES = [FACTS["moving_bodies"][joint.removesuffix("_joint")] for joint in FACTS["chain"][1:]]
 
 
