@@ -1,7 +1,6 @@
-"""Makes `scripts` and the test modules `worlds` and `reaches` importable."""
+"""Makes the package `scripts` importable."""
 
 import sys
 from pathlib import Path
 
-CHECKOUT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(CHECKOUT), str(CHECKOUT / "tests")]
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
