@@ -23,7 +23,6 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context, DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource
 from pydrake.systems.sensors import CameraInfo, ImageDepth32F, ImageRgba8U, RgbdSensor
 
 from lic_drake.clutter.instance import ClutterInstance
@@ -128,10 +127,6 @@ def add_rig(
     scene_graph.AddRenderer(_RENDERER, make_renderer())
     _add_prop(scene_graph, "ball", Sphere(cameras.ball_radius_m), p_WG, BALL_COLOR)
     _add_prop(scene_graph, "floor", Box(20.0, 20.0, 0.02), np.array([0, 0, -0.01]), FLOOR_COLOR)
-    for model in (scene.arm, scene.clutter):  # Nothing moves, and Drake wants to know what to hold.
-        wanted = plant.get_desired_state_input_port(model)
-        nothing = builder.AddSystem(ConstantVectorSource(np.zeros(wanted.size())))
-        builder.Connect(nothing.get_output_port(), wanted)
 
     mount = plant.GetFrameByName(HEAD_CAMERA)
     head_sensor = _make_sensor(

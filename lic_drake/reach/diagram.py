@@ -6,7 +6,6 @@ import numpy as np
 from pydrake.geometry import Meshcat, MeshcatVisualizer, MeshcatVisualizerParams, Role
 from pydrake.multibody.meshcat import ContactVisualizer, ContactVisualizerParams
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.control.mpc_controller import HapticMpcController
@@ -95,13 +94,6 @@ def make_reach_diagram(
         controller.GetOutputPort("desired_state"), plant.get_desired_state_input_port(scene.arm)
     )
     builder.ExportInput(controller.GetInputPort("goal"), "goal")
-
-    # The movables' actuators are their dry friction: they always want to stand still.
-    at_rest = plant.get_desired_state_input_port(scene.clutter)
-    standstill = builder.AddNamedSystem(
-        "standstill", ConstantVectorSource(np.zeros(at_rest.size()))
-    )
-    builder.Connect(standstill.get_output_port(), at_rest)
 
     builder.ExportOutput(plant.get_state_output_port(scene.arm), "arm_state")
     builder.ExportOutput(plant.get_state_output_port(scene.clutter), "clutter_state")

@@ -24,6 +24,7 @@ from pydrake.multibody.tree import (
     UnitInertia,
 )
 from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import ScenarioError
@@ -176,6 +177,10 @@ def add_scene(
             visuals,
         )
     plant.Finalize()
+    # Dry friction and springs are actuators that always want to stand still at 0.
+    at_rest = plant.get_desired_state_input_port(clutter)
+    standstill = ConstantVectorSource(np.zeros(at_rest.size()))
+    builder.Connect(builder.AddNamedSystem("standstill", standstill).get_output_port(), at_rest)
     return Scene(
         plant=plant,
         scene_graph=scene_graph,

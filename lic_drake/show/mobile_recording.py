@@ -7,7 +7,6 @@ import numpy as np
 from pydrake.geometry import MeshcatVisualizer, MeshcatVisualizerParams, Role
 from pydrake.multibody.meshcat import ContactVisualizer, ContactVisualizerParams
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.reach.pointing_starts import mobile_positions
@@ -56,10 +55,6 @@ class MobileRecording(MeshcatRecording):
         self._scene = add_scene(builder, arm, instance, scenario.scene, visuals=True)
         wear_meshes(self._scene, meshes)
         plant = self._plant = self._scene.plant
-        for of in (self._scene.arm, self._scene.clutter):
-            wanted = plant.get_desired_state_input_port(of)
-            nothing = builder.AddSystem(ConstantVectorSource(np.zeros(wanted.size())))
-            builder.Connect(nothing.get_output_port(), wanted)
         MeshcatVisualizer.AddToBuilder(
             builder,
             self._scene.scene_graph,

@@ -159,8 +159,6 @@ def make_world(
     plant = scene.plant
     plant_context = plant.GetMyMutableContextFromRoot(context)
     plant.SetPositions(plant_context, scene.arm, q)
-    at_rest = plant.get_desired_state_input_port(scene.clutter)
-    at_rest.FixValue(plant_context, np.zeros(at_rest.size()))
     world = World(
         diagram=diagram, context=context, scene=scene, simulator=Simulator(diagram, context)
     )
