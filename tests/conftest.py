@@ -34,7 +34,7 @@ def chromium() -> str:
 def _renderer() -> None:
     """Tests that ask for it are skipped where the graphics libraries are missing."""
     from lic_drake.errors import RenderingError
-    from lic_drake.perception.rendering import make_renderer
+    from lic_drake.perception.cameras import make_renderer
 
     try:
         make_renderer()

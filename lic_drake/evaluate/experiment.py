@@ -19,7 +19,7 @@ from lic_drake.experience.schema import scenario_text
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.experience.workers import prepare_worker
 from lic_drake.perception.config import load_cameras
-from lic_drake.perception.looking import Watch
+from lic_drake.perception.observer import Observer
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario, load_scenario, parse_scenario
@@ -220,7 +220,7 @@ class _Worker:
             for goal in range(evaluation.goals):
                 at = evaluation.first_environment if evaluation.common_goals else environment
                 p_WG = self.scenario.sample_goal(evaluation.stream, at, goal)
-                watch = self._watch(environment, p_WG)
+                observer = self._observer(environment, p_WG)
                 for method in evaluation.methods:
                     attempts = run_trial(
                         self.scenario,
@@ -232,22 +232,22 @@ class _Worker:
                         fresh=evaluation.fresh,
                         moves=evaluation.moves,
                         reach=self._reach,
-                        look=watch,
+                        look=observer,
                     )
                     last = attempts[-1].record
-                    won = last.success if watch is None else watch.touches_ball(last)
+                    won = last.success if observer is None else observer.touches_ball(last)
                     yield method, environment, goal, attempts, won
-                if watch is not None:
+                if observer is not None:
                     # A renderer takes 150 MB, and its diagram is a reference cycle: only the
                     # collector frees it.
-                    del watch
+                    del observer
                     gc.collect()
 
-    def _watch(self, environment: int, p_WG: Vector) -> Watch | None:
-        """Returns the cameras' watch over an environment; all strategies see the same."""
+    def _observer(self, environment: int, p_WG: Vector) -> Observer | None:
+        """Returns the observer of an environment; all strategies see the same images."""
         if self._cameras is None:
             return None
-        return Watch(
+        return Observer(
             scenario=self.scenario,
             stream=self._evaluation.stream,
             environment=environment,

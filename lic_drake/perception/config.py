@@ -1,16 +1,16 @@
-"""What the cameras are, where they stand and how wrong they are: plain data, read from YAML."""
+"""Cameras: where they are, their images and their errors, as plain data read from YAML."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from lic_drake.config import read_mapping, read_section
+from lic_drake.config import check_numbers, read_mapping, read_section
 from lic_drake.errors import ScenarioError
 from lic_drake.paths import models_dir
 
-MAX_PIXELS = 4096
-"""An image with more columns or rows is refused."""
+PIXELS = (16, 4096)
+"""Least and greatest number of columns or rows of an image."""
 
 
 @dataclass(kw_only=True)
@@ -28,30 +28,32 @@ class NoiseConfig:
     color_sigma: float = 4.0
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not (np.isfinite(value) and value >= 0.0):
-                raise ScenarioError(f"camera noise {name} must be 0 or positive, got {value}")
-        for name in ("dropout", "edge_dropout"):
-            if getattr(self, name) > 1.0:
-                raise ScenarioError(f"camera noise {name} must be at most 1: {getattr(self, name)}")
+        check_numbers(
+            self,
+            non_negative=("depth_sigma_per_m", "depth_step_per_m", "jump_m", "color_sigma"),
+            ranges={"dropout": (0.0, 1.0), "edge_dropout": (0.0, 1.0)},
+        )
+
+    @property
+    def disparity_sigma_per_m(self) -> float:
+        """Standard deviation of the disparity 1/z by noise and steps, 1/m."""
+        return float(np.hypot(self.depth_sigma_per_m, self.depth_step_per_m / 12**0.5))
 
 
 @dataclass(kw_only=True)
 class PoseErrorConfig:
-    """How far a camera is from where it is believed to be: standard deviations along each axis."""
+    """Errors of a camera's believed pose: standard deviations along each axis."""
 
     translation_m: float = 0.003
     rotation_deg: float = 0.15
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not (np.isfinite(value) and value >= 0.0):
-                raise ScenarioError(f"camera pose {name} must be 0 or positive, got {value}")
+        check_numbers(self, non_negative=("translation_m", "rotation_deg"))
 
 
 @dataclass(kw_only=True)
 class CameraConfig:
-    """A pinhole camera for colour and depth, registered to each other."""
+    """A pinhole camera with registered colour and depth images."""
 
     # Columns and rows of the images; focal length, in pixels; the range of depths, metres.
     width: int = 640
@@ -63,18 +65,12 @@ class CameraConfig:
     pose_error: PoseErrorConfig = field(default_factory=PoseErrorConfig)
 
     def __post_init__(self) -> None:
-        for name in ("width", "height"):
-            if not 16 <= getattr(self, name) <= MAX_PIXELS:
-                raise ScenarioError(
-                    f"camera {name} must be from 16 to {MAX_PIXELS}, got {getattr(self, name)}"
-                )
-        if not (np.isfinite(self.focal_px) and self.focal_px > 0.0):
-            raise ScenarioError(f"camera focal_px must be a positive number, got {self.focal_px}")
-        if not 0.0 < self.nearest_m < self.furthest_m < np.inf:
-            raise ScenarioError(
-                "a camera needs 0 < nearest_m < furthest_m, got"
-                f" {self.nearest_m} and {self.furthest_m}"
-            )
+        beyond = float(np.nextafter(self.nearest_m, np.inf))
+        check_numbers(
+            self,
+            positive=("focal_px", "nearest_m"),
+            ranges={"width": PIXELS, "height": PIXELS, "furthest_m": (beyond, 1000.0)},
+        )
 
 
 @dataclass(kw_only=True)
@@ -89,13 +85,12 @@ class HeadConfig:
     camera: CameraConfig = field(default_factory=CameraConfig)
 
     def __post_init__(self) -> None:
-        if len(self.base_pose) != 3 or not np.all(np.isfinite(self.base_pose)):
-            raise ScenarioError(f"base_pose must be [x, y, heading], got {self.base_pose}")
+        check_numbers(self, vectors={"base_pose": 3})
 
 
 @dataclass(kw_only=True)
 class ExternalConfig:
-    """A camera that stands by itself, its images upright."""
+    """A camera on a stand, its images upright."""
 
     # Where it is and what it looks at, in W, metres.
     p_WC: list[float] = field(default_factory=lambda: [2.1, 0.8, 1.45])
@@ -103,12 +98,8 @@ class ExternalConfig:
     camera: CameraConfig = field(default_factory=CameraConfig)
 
     def __post_init__(self) -> None:
-        for name in ("p_WC", "target"):
-            value = getattr(self, name)
-            if len(value) != 3 or not np.all(np.isfinite(value)):
-                raise ScenarioError(f"external {name} must be [x, y, z] in metres, got {value}")
-        across = np.linalg.norm(np.subtract(self.target, self.p_WC)[:2])
-        if across < 1e-6:
+        check_numbers(self, vectors={"p_WC": 3, "target": 3})
+        if np.linalg.norm(np.subtract(self.target, self.p_WC)[:2]) < 1e-6:
             raise ScenarioError(
                 f"an external camera cannot look straight up or down, from {self.p_WC} at"
                 f" {self.target}; move it"
@@ -117,7 +108,7 @@ class ExternalConfig:
 
 @dataclass(kw_only=True)
 class CamerasConfig:
-    """All cameras and the ball that one of them looks for."""
+    """Both cameras, and the ball that the external one looks for."""
 
     head: HeadConfig = field(default_factory=HeadConfig)
     external: ExternalConfig = field(default_factory=ExternalConfig)
@@ -125,27 +116,22 @@ class CamerasConfig:
     ball_radius_m: float = 0.03
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.ball_radius_m < 1.0:
-            raise ScenarioError(
-                f"ball_radius_m must be between 0 and 1 m, got {self.ball_radius_m}"
-            )
+        check_numbers(self, ranges={"ball_radius_m": (0.001, 1.0)})
 
 
 def load_cameras(name_or_path: str | Path = "foliage") -> CamerasConfig:
     """Reads the cameras of models/cameras/<name>.yaml, or of a YAML file.
 
     Raises:
-        ScenarioError: No such file, or a key or value that does not fit.
+        ScenarioError: There is no such file, or a key or value does not fit.
     """
-    path = Path(name_or_path)
+    path, shipped = Path(name_or_path), models_dir() / "cameras"
     if path.suffix not in (".yaml", ".yml"):
-        path = models_dir() / "cameras" / f"{name_or_path}.yaml"
+        path = shipped / f"{name_or_path}.yaml"
     try:
-        text = path.read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise ScenarioError(f"{path} is not a text file; cameras are YAML in UTF-8") from None
+        text = path.read_bytes()
     except (OSError, ValueError):
-        known = ", ".join(sorted(p.stem for p in (models_dir() / "cameras").glob("*.yaml")))
+        known = ", ".join(sorted(p.stem for p in shipped.glob("*.yaml")))
         raise ScenarioError(
             f"no cameras {str(name_or_path)!r}; shipped cameras: {known}, or give a .yaml path"
         ) from None

@@ -14,28 +14,27 @@ from lic_drake.perception.noise import pose_covariance
 from lic_drake.types import Vector
 
 YELLOW_HUE = (0.105, 0.19)
-"""Range of hues of the ball, 0 to 1."""
+"""Range of hues of the ball (orange to greenish yellow), 0 to 1."""
 YELLOW_SATURATION = 0.6
 """Least saturation of the ball, 0 to 1."""
 YELLOW_VALUE = 0.25
-"""Hues from orange to greenish yellow, out of 1, and how strong and bright they have to be."""
+"""Least brightness of the ball, 0 to 1."""
 
 MIN_PIXELS = 20
-"""A smaller spot is not taken for the ball."""
+"""Smaller yellow spots are not the ball."""
 
 RIM = 0.2
-"""Pixels in which rays pass nearer to a ball's rim than this share of radius^2 do not count for the
-covariance."""
+"""Rays that enter the ball by less than this share of radius^2 are left out of the covariance."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class DetectedGoal:
-    """The ball.
+    """The detected ball.
 
     Attributes:
         p_WG: Its centre, shape (3,), metres.
         covariance: Of the centre, shape (3, 3), m^2.
-        num_pixels: Number of pixels that show it.
+        num_pixels: Number of pixels of the yellow spot.
     """
 
     p_WG: Vector
@@ -44,9 +43,9 @@ class DetectedGoal:
 
 
 def find_goal(image: CameraImage, camera: CameraConfig, ball_radius_m: float) -> DetectedGoal:
-    """Finds the largest yellow spot and fits a ball to its depths.
+    """Fits a ball to the depths of the largest yellow spot.
 
-    The fit needs no outline, so leaves before the ball do not shift it.
+    The fit does not use the outline, so leaves in front of the ball do not shift it.
 
     Args:
         image: What the camera sees.
@@ -65,15 +64,15 @@ def find_goal(image: CameraImage, camera: CameraConfig, ball_radius_m: float) ->
     num_pixels = 0 if largest is None else int(largest.area)
     if largest is None or num_pixels < MIN_PIXELS:
         raise PerceptionError(
-            f"no yellow ball in view: the largest yellow spot has {num_pixels} pixels,"
+            f"no yellow ball in view: the largest yellow spot has {num_pixels} pixels, at least"
             f" {MIN_PIXELS} are needed; turn or move the external camera"
         )
     shown = (spots == largest.label) & np.isfinite(image.depth)
     depth, rays = image.depth[shown], image.rays()[shown]
     if len(depth) < MIN_PIXELS:
         raise PerceptionError(
-            f"the yellow ball has depth in {len(depth)} pixels, {MIN_PIXELS} are needed; move the"
-            " external camera to where the ball is within its range of depths"
+            f"the yellow ball has depth in {len(depth)} pixels, at least {MIN_PIXELS} are needed;"
+            " move the external camera so that the ball is within its range"
         )
     p_CG, covariance = _fit_ball(rays, depth, camera, ball_radius_m)
     p_WG = image.p_WC + image.R_WC @ p_CG
@@ -89,8 +88,7 @@ def _fit_ball(
     rays: Vector, depth: Vector, camera: CameraConfig, radius_m: float
 ) -> tuple[Vector, Vector]:
     """Returns p_CG, shape (3,), metres, and its covariance by the noise, shape (3, 3)."""
-    noise = camera.noise
-    sigma = max(float(np.hypot(noise.depth_sigma_per_m, noise.depth_step_per_m / 12**0.5)), 1e-5)
+    sigma = max(camera.noise.disparity_sigma_per_m, 1e-5)
 
     def residuals(p_CG: Vector) -> Vector:
         return (_disparity(rays, p_CG, radius_m) - 1.0 / depth) / sigma
@@ -98,21 +96,20 @@ def _fit_ball(
     middle = np.median(rays * depth[:, np.newaxis], axis=0)
     first = middle * (1.0 + radius_m / np.linalg.norm(middle))
     fit = least_squares(residuals, first, loss="soft_l1", f_scale=2.0)
-    # Towards its rim the ball's depth changes ever faster, and at last means nothing.
+    # The depth's derivative is unbounded at the ball's rim.
     jacobian = fit.jac[_inside(rays, fit.x, radius_m) > RIM * radius_m**2 * np.sum(rays**2, axis=1)]
     return fit.x, np.linalg.inv(jacobian.T @ jacobian)
 
 
 def _inside(rays: Vector, p_CG: Vector, radius_m: float) -> Vector:
     """Returns radius^2 - distance^2 of rays from a ball's centre, times the rays' length^2."""
-    inside: Vector = (rays @ p_CG) ** 2 - np.sum(rays**2, axis=1) * (p_CG @ p_CG - radius_m**2)
-    return inside
+    squared = np.sum(rays**2, axis=1) * (p_CG @ p_CG - radius_m**2)
+    return np.asarray((rays @ p_CG) ** 2 - squared)
 
 
 def _disparity(rays: Vector, p_CG: Vector, radius_m: float) -> Vector:
-    """Returns 1/z where rays meet a ball; beside it, where they pass nearest to it."""
+    """Returns 1/z where rays meet a ball, or where they pass closest to it."""
     length2 = np.sum(rays * rays, axis=1)
     along = rays @ p_CG
     inside = _inside(rays, p_CG, radius_m)
-    disparity: Vector = length2 / (along - np.sqrt(np.maximum(inside, 0.0)))
-    return disparity
+    return np.asarray(length2 / (along - np.sqrt(np.maximum(inside, 0.0))))

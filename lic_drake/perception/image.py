@@ -1,6 +1,7 @@
-"""`CameraImage`: a colour and depth image, and where its camera is believed to be."""
+"""`CameraImage`: colours and depths, and the pose that the robot believes its camera to have."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,16 +11,16 @@ from lic_drake.types import Vector
 
 @dataclass(frozen=True, kw_only=True)
 class CameraImage:
-    """All that perception gets of a view.
+    """Everything that perception gets from a camera.
 
     Attributes:
         color: Shape (height, width, 3).
         depth: Along the optical axis, shape (height, width), metres; NaN where nothing was
             measured.
         focal_px: Focal length, pixels.
-        R_WC: The camera's axes in W, as the robot believes, shape (3, 3): x right, y down, z
-            forward in the image.
-        p_WC: Its position, shape (3,), metres.
+        R_WC: The camera's believed axes in W, shape (3, 3): x right, y down, z forward in the
+            image.
+        p_WC: Its believed position, shape (3,), metres.
     """
 
     color: NDArray[np.uint8]
@@ -46,7 +47,7 @@ class CameraImage:
         """Returns where points appear, (column, row), shape (n, 2), pixels.
 
         Args:
-            p_WQ: Points before the camera, shape (n, 3), metres.
+            p_WQ: Points in front of the camera, shape (n, 3), metres.
         """
         return self.project_from_camera((p_WQ - self.p_WC) @ self.R_WC)
 
@@ -58,5 +59,16 @@ class CameraImage:
         """
         height, width = self.shape
         centre = np.array([0.5 * width - 0.5, 0.5 * height - 0.5])
-        pixels: Vector = self.focal_px * p_CQ[..., :2] / p_CQ[..., 2:] + centre
-        return pixels
+        return np.asarray(self.focal_px * p_CQ[..., :2] / p_CQ[..., 2:] + centre)
+
+
+class Views(NamedTuple):
+    """Images of an environment.
+
+    Attributes:
+        head: From the PR2's head.
+        external: From the camera that sees the goal.
+    """
+
+    head: CameraImage
+    external: CameraImage

@@ -1,4 +1,4 @@
-"""Errors of depth cameras: noise and gaps in their images, and poses that are not quite so.
+"""Errors of depth cameras: noise and gaps in their images, and errors of their believed poses.
 
 The random error of a depth and the step in which depths come grow with the depth squared, because
 such cameras measure disparities: Khoshelham and Elberink, "Accuracy and resolution of Kinect depth
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.spatial.transform import Rotation
 
-from lic_drake.perception.config import CameraConfig, NoiseConfig, PoseErrorConfig
-from lic_drake.perception.image import CameraImage
+from lic_drake.perception.config import CameraConfig, CamerasConfig, NoiseConfig, PoseErrorConfig
+from lic_drake.perception.image import CameraImage, Views
 from lic_drake.types import Vector
 
 _FAR_M = 1e6
@@ -31,13 +31,12 @@ def add_depth_noise(depth: Vector, config: NoiseConfig, rng: np.random.Generator
     disparity = 1.0 / depth
     disparity += config.depth_sigma_per_m * rng.standard_normal(depth.shape)
     if config.depth_step_per_m > 0.0:
-        # A step of the disparity 1/z is everywhere the same one.
+        # The step of the disparity 1/z is uniform.
         disparity = config.depth_step_per_m * np.round(disparity / config.depth_step_per_m)
     known = np.nan_to_num(depth, nan=_FAR_M)
     jump = maximum_filter(known, 3) - minimum_filter(known, 3) > config.jump_m
     lost = rng.random(depth.shape) < np.where(jump, config.edge_dropout, config.dropout)
-    measured: Vector = np.where(lost | ~(disparity > 0.0), np.nan, 1.0 / np.abs(disparity))
-    return measured
+    return np.where(lost | ~(disparity > 0.0), np.nan, 1.0 / np.abs(disparity))
 
 
 def add_color_noise(
@@ -51,9 +50,7 @@ def add_color_noise(
 def disturbed_image(
     image: CameraImage, config: CameraConfig, rng: np.random.Generator
 ) -> CameraImage:
-    """Returns an image with the errors of its pixels and of its camera's pose.
-
-    The camera stays where it is, and is believed to be somewhere else.
+    """Returns an image with errors of its pixels and of its camera's believed pose.
 
     Args:
         image: An exact image.
@@ -72,15 +69,22 @@ def disturbed_image(
     )
 
 
+def disturbed_views(views: Views, cameras: CamerasConfig, rng: np.random.Generator) -> Views:
+    """Returns both images with errors; see `disturbed_image`."""
+    return Views(
+        head=disturbed_image(views.head, cameras.head.camera, rng),
+        external=disturbed_image(views.external, cameras.external.camera, rng),
+    )
+
+
 def pose_covariance(p_CQ_W: Vector, config: PoseErrorConfig) -> Vector:
-    """Returns what errors of the camera's pose add to the covariance of a point, shape (3, 3).
+    """Returns the covariance of a point by the errors of the camera's pose, shape (3, 3), m^2.
 
     Args:
-        p_CQ_W: The point from the camera, in W, shape (3,), metres.
+        p_CQ_W: The point relative to the camera, in W, shape (3,), metres.
         config: The errors, the same along all axes.
     """
     x, y, z = p_CQ_W
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     angle = np.deg2rad(config.rotation_deg)
-    covariance: Vector = config.translation_m**2 * np.eye(3) + angle**2 * cross @ cross.T
-    return covariance
+    return np.asarray(config.translation_m**2 * np.eye(3) + angle**2 * cross @ cross.T)

@@ -13,9 +13,9 @@ from lic_drake.errors import LicError
 from lic_drake.evaluate.trial import Attempt, run_trial
 from lic_drake.experience.added import added_columns
 from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.perception.cameras import make_renderer
 from lic_drake.perception.config import CamerasConfig
-from lic_drake.perception.looking import Watch
-from lic_drake.perception.rendering import make_renderer
+from lic_drake.perception.observer import Observer
 from lic_drake.reach.pointing_starts import PointingStarts
 from lic_drake.reach.request import IN_PLANE, ReachRecord, ReachRequest, is_within_reach
 from lic_drake.reach.rollout import make_record, simulate_request
@@ -102,12 +102,12 @@ def demonstrate(
         ),
         say,
     )
-    watch = None
+    observer = None
     if cameras is not None:
-        watch = Watch(
+        observer = Observer(
             scenario=scenario, stream="evaluation", environment=seed, p_WG=p_WG, cameras=cameras
         )
-        pictures: Pictures = LookingPictures(instance, watch, meshes)
+        pictures: Pictures = LookingPictures(instance, observer, meshes)
     elif isinstance(starts, PointingStarts):
         pictures = AperturePictures(scenario, instance, starts, p_WG, meshes)
     else:
@@ -129,8 +129,8 @@ def demonstrate(
         return record
 
     def look(number: int) -> tuple[Vector, Starts]:
-        assert watch is not None
-        belief = watch.belief(number)
+        assert observer is not None
+        belief = observer.belief(number)
         off = 1000 * np.linalg.norm(belief.p_WG - p_WG)
         say(
             f"look {number + 1}: {len(belief.index)} of {len(belief.look.apertures.p_WA)} apertures"
@@ -147,7 +147,7 @@ def demonstrate(
         p_WG,
         attempts,
         reach=reach,
-        look=None if watch is None else look,
+        look=None if observer is None else look,
     )
     chosen = selector.selector
     if not isinstance(chosen, LicSelector):  # Shows what LIC would have thought of the choices.
@@ -157,7 +157,7 @@ def demonstrate(
     files = {**pictures.save(out, chosen, done), "data": out / "demo.json"}
     files |= save_stills(scenario, instance, p_WG, done, traces, out, say, meshes)
     last = done[-1].record
-    success = last.success if watch is None else watch.touches_ball(last)
+    success = last.success if observer is None else observer.touches_ball(last)
     demonstration = Demonstration(p_WG=p_WG, attempts=done, success=success, files=files)
     _write_json(demonstration, method, seed)
     return demonstration

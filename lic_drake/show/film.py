@@ -13,8 +13,8 @@ from pydrake.systems.sensors import ImageRgba8U, RgbdSensor
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import LicError
+from lic_drake.perception.cameras import add_cameras
 from lic_drake.perception.config import CameraConfig, CamerasConfig
-from lic_drake.perception.views import add_rig
 from lic_drake.reach.pointing_starts import mobile_positions
 from lic_drake.reach.trace import SceneState
 from lic_drake.types import Vector
@@ -42,7 +42,7 @@ class FilmCamera:
             head=replace(cameras.head, camera=_shrunk(cameras.head.camera)),
             external=replace(cameras.external, camera=_shrunk(cameras.external.camera)),
         )
-        self._rig = add_rig(builder, instance, p_WG, small, mobile=True)
+        self._rig = add_cameras(builder, instance, p_WG, small, mobile=True)
         self._diagram = builder.Build()
         self._context = self._diagram.CreateDefaultContext()
 

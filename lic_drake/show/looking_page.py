@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from lic_drake.evaluate.trial import Attempt
-from lic_drake.perception.looking import Watch
+from lic_drake.perception.observer import Observer
 from lic_drake.show.embed import UNPACK, pack, read_page
 
 _STYLE = """
@@ -17,11 +17,13 @@ figure { margin: 1rem 0; } figcaption { color: #555; font-size: 0.9rem; }
 """
 
 
-def make_sequence_page(watch: Watch, done: Sequence[Attempt], files: Mapping[str, Path]) -> str:
+def make_sequence_page(
+    observer: Observer, done: Sequence[Attempt], files: Mapping[str, Path]
+) -> str:
     """Returns the page.
 
     Args:
-        watch: What the robot saw.
+        observer: What the robot saw.
         done: The attempts in their order.
         files: The recording ("recording"), the looks ("look 1" and so on) and, if there is one, the
             film of both cameras ("views").
@@ -30,8 +32,8 @@ def make_sequence_page(watch: Watch, done: Sequence[Attempt], files: Mapping[str
         LicError: The recording cannot be read.
     """
     last = done[-1].record
-    word = "reached" if watch.touches_ball(last) else "not reached"
-    title = f"{watch.scenario.category}, environment {watch.environment}: {word}"
+    word = "reached" if observer.touches_ball(last) else "not reached"
+    title = f"{observer.scenario.category}, environment {observer.environment}: {word}"
     parts = [
         f"<h1>{html.escape(title)}</h1>",
         "<p>The robot looks, selects an aperture, a place for its base and a height for its torso,"

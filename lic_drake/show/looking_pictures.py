@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.evaluate.trial import Attempt
-from lic_drake.perception.looking import Watch
+from lic_drake.perception.observer import Observer
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.select.lic import LicSelector
@@ -31,25 +31,27 @@ class LookingPictures(AperturePictures):
     """A PR2 before foliage: the looks with their maps, the reaches, and both cameras' views."""
 
     def __init__(
-        self, instance: ClutterInstance, watch: Watch, meshes: Sequence[LinkMesh] = ()
+        self, instance: ClutterInstance, observer: Observer, meshes: Sequence[LinkMesh] = ()
     ) -> None:
         """Sets up the pictures.
 
         Args:
             instance: The environment.
-            watch: What the robot sees of it.
+            observer: What the robot sees of it.
             meshes: What the PR2 wears instead of the shapes of its model.
         """
-        super().__init__(watch.scenario, instance, watch.belief(0).starts, watch.p_WG, meshes)
-        self._watch = watch
+        super().__init__(
+            observer.scenario, instance, observer.belief(0).starts, observer.p_WG, meshes
+        )
+        self._observer = observer
         self._frames: list[NDArray[np.uint8]] = []
-        self._film = FilmCamera(instance, watch.p_WG, watch.cameras)
+        self._film = FilmCamera(instance, observer.p_WG, observer.cameras)
 
     def add(self, request: ReachRequest, record: ReachRecord, trace: ReachTrace) -> None:
         """Records base, torso and arm moving to the start, and the reach; films it."""
         super().add(request, record, trace)
         b0 = np.array([*request.base, request.torso])
-        step = max(1, round(self._watch.scenario.mpc.rate_hz / FRAMES_PER_SECOND))
+        step = max(1, round(self._observer.scenario.mpc.rate_hz / FRAMES_PER_SECOND))
         self._frames += [self._film.frame(b0, state) for state in trace.states[::step]]
 
     def save(self, out: Path, selector: LicSelector, done: Sequence[Attempt]) -> dict[str, Path]:
@@ -62,7 +64,7 @@ class LookingPictures(AperturePictures):
             files["views"] = out / "views.webp"
             save_film(self._frames, 2.0 * FRAMES_PER_SECOND, files["views"])
         files["sequence"] = out / "sequence.html"
-        page = make_sequence_page(self._watch, done, files)
+        page = make_sequence_page(self._observer, done, files)
         files["sequence"].write_text(page, encoding="utf-8")
         return files
 
@@ -76,18 +78,18 @@ class LookingPictures(AperturePictures):
 
     def _look_figure(self, selector: LicSelector, done: Sequence[Attempt], number: int) -> Figure:
         """Returns what was seen before an attempt, from 0, and what was made of it."""
-        look = self._watch.belief(number).look
+        look = self._observer.belief(number).look
         figure = Figure(figsize=(15.0, 4.3), layout="constrained")
         seen, estimated, external = figure.subplots(1, 3)
         draw_apertures(seen, look.views.head, look.apertures)
         seen.set_title("head camera: probability of being open", fontsize=10)
         self._draw_map(estimated, selector, done, number)
-        draw_goal(external, look.views.external, look.goal, self._watch.cameras.ball_radius_m)
+        draw_goal(external, look.views.external, look.goal, self._observer.cameras.ball_radius_m)
         external.set_title(f"external camera: {external.get_title()}", fontsize=10)
         return figure
 
     def _draw_map(self, ax: Axes, selector: LicSelector, done: Sequence[Attempt], k: int) -> None:
-        belief = self._watch.belief(k)
+        belief = self._observer.belief(k)
         failed = tuple(FailedReach.from_record(a.record) for a in done[:k])
         situation = Situation(p_WG=belief.p_WG, starts=belief.starts, failed=failed)
         values = estimate_apertures(selector.objective(situation), belief.starts)

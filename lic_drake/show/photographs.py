@@ -27,9 +27,8 @@ from pydrake.systems.sensors import CameraInfo, ImageRgba8U, RgbdSensor
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import RenderingError
+from lic_drake.perception.cameras import look_at, make_renderer
 from lic_drake.perception.image import CameraImage
-from lic_drake.perception.rendering import make_renderer
-from lic_drake.perception.views import look_at
 from lic_drake.reach.pointing_starts import mobile_positions
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.trace import SceneState

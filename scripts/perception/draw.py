@@ -13,10 +13,11 @@ from matplotlib.figure import Figure
 from matplotlib.image import imsave
 
 from lic_drake.perception.apertures import find_apertures
-from lic_drake.perception.belief import board_of
+from lic_drake.perception.cameras import take_views
 from lic_drake.perception.config import load_cameras
 from lic_drake.perception.goal import find_goal
-from lic_drake.perception.views import disturbed, take_views
+from lic_drake.perception.noise import disturbed_views
+from lic_drake.perception.observer import board_of
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.seeds import make_generator
 from lic_drake.show.drawing import draw_apertures, draw_goal
@@ -35,7 +36,7 @@ def main() -> int:
     p_WG = scenario.sample_goal("calibration", args.scene)
     rng = make_generator("calibration", "camera errors", args.scene)
     exact = take_views(instance, p_WG, cameras)
-    views = disturbed(exact, cameras, rng)
+    views = disturbed_views(exact, cameras, rng)
     _, board = board_of(scenario)
     apertures = find_apertures(views.head, cameras.head.camera, board)
     goal = find_goal(views.external, cameras.external.camera, cameras.ball_radius_m)

@@ -7,7 +7,8 @@ from support.ray_casting import OTHER, blank, draw_boxes, draw_instance, tilted
 from lic_drake.clutter.foliage import FoliageApertureClutter
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import PerceptionError, ScenarioError
-from lic_drake.perception.apertures import BoardModel, DetectedApertures, find_apertures
+from lic_drake.perception.apertures import DetectedApertures, find_apertures
+from lic_drake.perception.board_grid import BoardModel
 from lic_drake.perception.board_plane import find_board_plane
 from lic_drake.perception.config import CameraConfig, PoseErrorConfig
 from lic_drake.perception.image import CameraImage
@@ -132,12 +133,12 @@ def test_the_plane_of_the_board_is_its_front() -> None:
     assert p_WO[0] == pytest.approx(0.625, abs=0.002)
 
 
-def test_without_a_board_that_is_said() -> None:
+def test_an_image_without_a_board_is_refused() -> None:
     with pytest.raises(PerceptionError, match="no board in view: 0 brown pixels"):
         find(blank(tilted(18.0), P_WC))
     image = blank(tilted(18.0), P_WC)
     draw_boxes(image, np.array([[0.5, -0.19, 0.94]]), np.array([[0.02, 0.1, 2.0]]), [(110, 69, 36)])
     with pytest.raises(PerceptionError, match="no board of 4 x 5 apertures"):
         find(image)
-    with pytest.raises(ScenarioError, match="rows and columns from 1"):
+    with pytest.raises(ScenarioError, match="rows must be a positive number"):
         BoardModel(rows=0)

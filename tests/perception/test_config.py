@@ -44,14 +44,11 @@ def test_unknown_files_and_keys_are_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("config", "values", "message"),
     [
-        (NoiseConfig(), {"dropout": 1.5}, "dropout must be at most 1"),
-        (NoiseConfig(), {"color_sigma": -1.0}, "color_sigma must be 0 or positive"),
-        (PoseErrorConfig(), {"rotation_deg": float("nan")}, "rotation_deg must be 0 or positive"),
-        (CameraConfig(), {"focal_px": 0.0}, "focal_px must be a positive number"),
-        (CameraConfig(), {"nearest_m": 6.0}, "nearest_m < furthest_m"),
-        (HeadConfig(), {"base_pose": [0.0, 1.0]}, r"base_pose must be \[x, y, heading\]"),
+        (NoiseConfig(), {"dropout": 1.5}, "dropout must be from 0 to 1, got 1.5"),
+        (PoseErrorConfig(), {"rotation_deg": float("nan")}, "rotation_deg must be 0 or a positive"),
+        (CameraConfig(), {"nearest_m": 6.0}, "furthest_m must be from 6"),
+        (HeadConfig(), {"base_pose": [0.0, 1.0]}, "base_pose must be 3 finite numbers"),
         (ExternalConfig(), {"p_WC": [0.84, -0.29, 3.0]}, "cannot look straight up or down"),
-        (CamerasConfig(), {"ball_radius_m": 0.0}, "ball_radius_m must be between"),
     ],
 )
 def test_values_that_make_no_sense_are_refused(

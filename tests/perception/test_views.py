@@ -7,10 +7,13 @@ import pytest
 from support.ray_casting import blank, draw_ball, draw_instance, tilted
 
 from lic_drake.clutter.foliage import FoliageApertureClutter
-from lic_drake.perception.apertures import BoardModel, find_apertures
+from lic_drake.perception.apertures import find_apertures
+from lic_drake.perception.board_grid import BoardModel
+from lic_drake.perception.cameras import take_views
 from lic_drake.perception.config import CameraConfig, CamerasConfig, ExternalConfig, HeadConfig
 from lic_drake.perception.goal import find_goal
-from lic_drake.perception.views import Views, disturbed, take_views
+from lic_drake.perception.image import Views
+from lic_drake.perception.noise import disturbed_views
 from lic_drake.seeds import make_generator
 
 CAMERA = CameraConfig(width=320, height=240, focal_px=262.5)
@@ -67,7 +70,7 @@ def test_what_is_rendered_is_found(views: Views) -> None:
 
 def test_disturbed_views_are_the_same_for_the_same_generator(views: Views) -> None:
     first, second, other = (
-        disturbed(views, CAMERAS, np.random.default_rng(seed)) for seed in (0, 0, 1)
+        disturbed_views(views, CAMERAS, np.random.default_rng(seed)) for seed in (0, 0, 1)
     )
     np.testing.assert_array_equal(first.head.depth, second.head.depth)
     np.testing.assert_array_equal(first.external.p_WC, second.external.p_WC)

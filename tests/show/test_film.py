@@ -5,8 +5,8 @@ import pytest
 from PIL import Image
 
 from lic_drake.errors import LicError
+from lic_drake.perception.cameras import take_views
 from lic_drake.perception.config import CameraConfig, CamerasConfig, ExternalConfig, HeadConfig
-from lic_drake.perception.views import take_views
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.trace import SceneState
 from lic_drake.robots.pr2_head import RIGHT_ARM_AT_REST

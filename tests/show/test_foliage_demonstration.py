@@ -11,7 +11,7 @@ from lic_drake.evaluate.experiment import Evaluation, run_evaluation
 from lic_drake.experience.grid import REQUEST_FILE, CollectionRequest, write_request
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.perception.config import CamerasConfig, load_cameras
-from lic_drake.perception.looking import Watch
+from lic_drake.perception.observer import Observer
 from lic_drake.reach.request import make_request
 from lic_drake.reach.scenario import Scenario, load_scenario
 from lic_drake.show.demonstration import demonstrate
@@ -83,12 +83,14 @@ def test_the_robot_looks_before_every_attempt_and_shows_it(
 
 def test_success_is_to_touch_the_ball(scenario: Scenario, cameras: CamerasConfig) -> None:
     p_WG = np.array([0.84, -0.1, 0.9])
-    watch = Watch(scenario=scenario, stream="training", environment=0, p_WG=p_WG, cameras=cameras)
+    observer = Observer(
+        scenario=scenario, stream="training", environment=0, p_WG=p_WG, cameras=cameras
+    )
     x0 = np.array([0.5, 0.0, 0.9, 1.0, 0.0, 0.0, 0.0])
     record = make_record(make_request(scenario, "training", 0, p_WG, x0))
     for off, success, touches in ((0.02, True, True), (0.04, True, False), (0.02, False, False)):
         end = replace(record, final_x=0.84, final_y=-0.1 + off, final_z=0.9, success=success)
-        assert watch.touches_ball(end) == touches
+        assert observer.touches_ball(end) == touches
 
 
 def test_strategies_are_compared_by_what_the_cameras_see(

@@ -10,12 +10,12 @@ import pytest
 
 from lic_drake.errors import PerceptionError
 from lic_drake.perception.apertures import find_apertures
-from lic_drake.perception.belief import believe, board_of
+from lic_drake.perception.camera_station import NUM_CAMERAS, CameraStation
+from lic_drake.perception.cameras import take_views
 from lic_drake.perception.config import CameraConfig, CamerasConfig, ExternalConfig, HeadConfig
 from lic_drake.perception.goal import find_goal
-from lic_drake.perception.lookout import NUM_CAMERAS, Lookout
 from lic_drake.perception.noise import disturbed_image
-from lic_drake.perception.views import take_views
+from lic_drake.perception.observer import board_of, estimate_board
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.seeds import make_generator
 
@@ -30,15 +30,15 @@ pytestmark = pytest.mark.usefixtures("_renderer")
 
 
 @pytest.fixture(scope="module")
-def lookout() -> Lookout:
-    return Lookout(INSTANCE, P_WG, CAMERAS, board_of(SCENARIO)[1], DRAW)
+def station() -> CameraStation:
+    return CameraStation(INSTANCE, P_WG, CAMERAS, board_of(SCENARIO)[1], DRAW)
 
 
 @pytest.mark.parametrize("number", [0, 1])
 def test_a_look_is_what_cameras_errors_and_detectors_make_of_it(
-    lookout: Lookout, number: int
+    station: CameraStation, number: int
 ) -> None:
-    look = lookout.look(number)
+    look = station.look(number)
     exact = take_views(INSTANCE, P_WG, CAMERAS)
     head = disturbed_image(exact.head, CAMERA, DRAW(NUM_CAMERAS * number))
     external = disturbed_image(exact.external, CAMERA, DRAW(NUM_CAMERAS * number + 1))
@@ -53,22 +53,24 @@ def test_a_look_is_what_cameras_errors_and_detectors_make_of_it(
 
 def test_what_a_detector_raises_comes_out_of_the_diagram() -> None:
     away = replace(CAMERAS.external, target=[2.1, 3.0, 1.0])
-    blind = Lookout(INSTANCE, P_WG, replace(CAMERAS, external=away), board_of(SCENARIO)[1], DRAW)
+    blind = CameraStation(
+        INSTANCE, P_WG, replace(CAMERAS, external=away), board_of(SCENARIO)[1], DRAW
+    )
     with pytest.raises(PerceptionError, match="no yellow ball in view"):
         blind.look(0)
 
 
 def test_a_lookout_dies() -> None:
-    lookout = Lookout(INSTANCE, P_WG, CAMERAS, board_of(SCENARIO)[1], DRAW)
-    alive = weakref.ref(lookout.diagram)
-    del lookout
+    station = CameraStation(INSTANCE, P_WG, CAMERAS, board_of(SCENARIO)[1], DRAW)
+    alive = weakref.ref(station.diagram)
+    del station
     gc.collect()
     assert alive() is None
 
 
-def test_the_robot_believes_what_it_saw(lookout: Lookout) -> None:
-    look = lookout.look(0)
-    belief = believe(SCENARIO, look)
+def test_the_robot_believes_what_it_saw(station: CameraStation) -> None:
+    look = station.look(0)
+    belief = estimate_board(SCENARIO, look)
     np.testing.assert_array_equal(belief.p_WG, look.goal.p_WG)
     starts = belief.starts
     # The board is where it was seen, not where it is.
@@ -89,15 +91,15 @@ def test_the_robot_believes_what_it_saw(lookout: Lookout) -> None:
     everywhere = belief.over_all(np.arange(len(belief.index), dtype=float))
     np.testing.assert_array_equal(everywhere[belief.index], np.arange(len(belief.index)))
     assert np.isnan(everywhere).sum() == 20 - len(belief.index)
-    still = believe(SCENARIO, look, moves=False)
+    still = estimate_board(SCENARIO, look, moves=False)
     assert len(np.unique(still.starts.grid.b0, axis=0)) == 1
 
 
-def test_a_board_that_seems_shut_is_refused(lookout: Lookout) -> None:
-    look = lookout.look(0)
+def test_a_board_that_seems_shut_is_refused(station: CameraStation) -> None:
+    look = station.look(0)
     shut = replace(look, apertures=replace(look.apertures, probability_open=np.zeros(20)))
     with pytest.raises(PerceptionError, match="none of 20 apertures looks open"):
-        believe(SCENARIO, shut)
+        estimate_board(SCENARIO, shut)
     away = replace(look, apertures=replace(look.apertures, p_WA=look.apertures.p_WA + 0.5))
-    with pytest.raises(PerceptionError, match="where it cannot be"):
-        believe(SCENARIO, away)
+    with pytest.raises(PerceptionError, match="at an impossible place"):
+        estimate_board(SCENARIO, away)

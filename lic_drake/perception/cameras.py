@@ -1,0 +1,253 @@
+"""The simulated cameras: Drake's RGB-D sensors on a PR2's head and next to the clutter.
+
+Images are rendered by VTK on EGL, which needs neither display nor GPU.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import (
+    Box,
+    ClippingRange,
+    ColorRenderCamera,
+    DepthRange,
+    DepthRenderCamera,
+    FrameId,
+    GeometryInstance,
+    LightParameter,
+    MakeRenderEngineVtk,
+    PerceptionProperties,
+    RenderCameraCore,
+    RenderEngine,
+    RenderEngineVtkParams,
+    RenderLabel,
+    Rgba,
+    SceneGraph,
+    Shape,
+    Sphere,
+)
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.systems.framework import Context, DiagramBuilder
+from pydrake.systems.sensors import CameraInfo, ImageDepth32F, ImageRgba8U, RgbdSensor
+
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.errors import RenderingError
+from lic_drake.perception.config import CameraConfig, CamerasConfig
+from lic_drake.perception.image import CameraImage, Views
+from lic_drake.robots.pr2_head import HEAD_CAMERA, RIGHT_ARM_AT_REST, LookingPr2
+from lic_drake.scene.scene import Scene, SceneConfig, add_scene
+from lic_drake.types import Vector
+
+RENDERER = "vtk"
+"""Name of the renderer in a scene graph."""
+
+PACKAGES = "libegl1 libgl1 libgl1-mesa-dri"
+"""Debian packages that the renderer needs."""
+
+BALL_COLOR = np.array([0.95, 0.80, 0.05, 1.0])
+"""Colour of the goal, RGBA."""
+FLOOR_COLOR = np.array([0.62, 0.62, 0.64, 1.0])
+"""Colour of the floor, RGBA."""
+
+_CLIPPING_M = (0.02, 20.0)
+# A ceiling lamp, and some light from the camera.
+_ROOM = (
+    LightParameter(type="directional", frame="world", direction=[0.3, -0.2, -1.0], intensity=0.8),
+    LightParameter(type="directional", frame="camera", direction=[0, 0, 1], intensity=0.6),
+)
+
+
+def make_renderer(lights: Sequence[LightParameter] = _ROOM) -> RenderEngine:
+    """Returns a renderer of camera images.
+
+    Raises:
+        RenderingError: A system library is missing.
+    """
+    params = RenderEngineVtkParams(
+        backend="EGL", default_clear_color=[0.80, 0.84, 0.88], lights=list(lights)
+    )
+    try:
+        return MakeRenderEngineVtk(params)
+    except RuntimeError as error:
+        raise RenderingError(
+            f"cameras cannot be simulated: {' '.join(str(error).split())} A graphics library is"
+            f" missing or does not work; install it with: apt-get install {PACKAGES}"
+        ) from None
+
+
+class CameraRig(NamedTuple):
+    """A scene with a PR2 that looks, and its cameras, in a diagram.
+
+    Attributes:
+        scene: Robot and environment.
+        head: The sensor on the robot's head.
+        external: The sensor that sees the goal.
+    """
+
+    scene: Scene
+    head: RgbdSensor
+    external: RgbdSensor
+
+    def set_looking_posture(self, root: Context) -> None:
+        """Puts the robot's right arm beside its body, in a context of the diagram."""
+        plant = self.scene.plant
+        context = plant.GetMyMutableContextFromRoot(root)
+        plant.SetPositions(context, self.scene.arm, RIGHT_ARM_AT_REST)
+
+
+def add_cameras(
+    builder: DiagramBuilder,
+    instance: ClutterInstance,
+    p_WG: Vector,
+    cameras: CamerasConfig,
+    mobile: bool = False,
+) -> CameraRig:
+    """Adds an environment, a ball at the goal, the robot where it looks from, and the cameras.
+
+    Args:
+        builder: Gets plant, scene graph and the sensors `head` and `external`.
+        instance: The environment.
+        p_WG: The goal, shape (3,), metres.
+        cameras: The cameras.
+        mobile: Whether the robot's base and torso are joints.
+
+    Raises:
+        RenderingError: The renderer does not work on this machine.
+    """
+    head, external = cameras.head, cameras.external
+    robot = LookingPr2(head.base_pose, head.torso_m, head.tilt_deg, mobile)
+    scene = add_scene(builder, robot, instance, SceneConfig(), visuals=True)
+    plant, scene_graph = scene.plant, scene.scene_graph
+    scene_graph.AddRenderer(RENDERER, make_renderer())
+    add_prop(scene_graph, "ball", Sphere(cameras.ball_radius_m), p_WG, BALL_COLOR)
+    add_prop(scene_graph, "floor", Box(20.0, 20.0, 0.02), np.array([0, 0, -0.01]), FLOOR_COLOR)
+    mount = plant.GetFrameByName(HEAD_CAMERA)
+    parent = plant.GetBodyFrameIdOrThrow(mount.body().index())
+    X_WC = look_at(external.p_WC, external.target)
+    return CameraRig(
+        scene=scene,
+        head=add_camera(
+            builder, scene_graph, "head", head.camera, mount.GetFixedPoseInBodyFrame(), parent
+        ),
+        external=add_camera(builder, scene_graph, "external", external.camera, X_WC),
+    )
+
+
+def take_views(instance: ClutterInstance, p_WG: Vector, cameras: CamerasConfig) -> Views:
+    """Returns exact images of an environment with a ball at the goal, before the robot reaches.
+
+    `lic_drake.perception.noise.disturbed_views` adds the errors.
+
+    Args:
+        instance: The environment.
+        p_WG: The goal, shape (3,), metres.
+        cameras: The cameras.
+
+    Raises:
+        RenderingError: The renderer does not work on this machine.
+    """
+    builder = DiagramBuilder()
+    rig = add_cameras(builder, instance, p_WG, cameras)
+    diagram = builder.Build()
+    root = diagram.CreateDefaultContext()
+    rig.set_looking_posture(root)
+    return Views(
+        head=_take(rig.head, root, cameras.head.camera),
+        external=_take(rig.external, root, cameras.external.camera),
+    )
+
+
+def _take(sensor: RgbdSensor, root: Context, config: CameraConfig) -> CameraImage:
+    context = sensor.GetMyContextFromRoot(root)
+    return camera_image(
+        cast(ImageRgba8U, sensor.color_image_output_port().Eval(context)),
+        cast(ImageDepth32F, sensor.depth_image_32F_output_port().Eval(context)),
+        cast(RigidTransform, sensor.body_pose_in_world_output_port().Eval(context)),
+        config.focal_px,
+    )
+
+
+def camera_image(
+    rgba: ImageRgba8U, depth_image: ImageDepth32F, X_WC: RigidTransform, focal_px: float
+) -> CameraImage:
+    """Returns the images of an `RgbdSensor` and the pose they are taken from as plain arrays."""
+    # Copies: what Drake returns may be a view of its own memory.
+    color = np.array(np.asarray(rgba.data)[..., :3])
+    depth = np.array(np.asarray(depth_image.data)[..., 0], dtype=np.float64)
+    depth[~np.isfinite(depth) | (depth <= 0.0)] = np.nan
+    return CameraImage(
+        color=color,
+        depth=depth,
+        focal_px=focal_px,
+        R_WC=np.array(X_WC.rotation().matrix()),
+        p_WC=np.array(X_WC.translation()),
+    )
+
+
+def take_color_image(sensor: RgbdSensor, root: Context) -> NDArray[np.uint8]:
+    """Returns the colours that a sensor sees, shape (height, width, 3), without rendering depth."""
+    rgba = sensor.color_image_output_port().Eval(sensor.GetMyContextFromRoot(root))
+    return np.array(np.asarray(cast(ImageRgba8U, rgba).data)[..., :3])
+
+
+def add_camera(
+    builder: DiagramBuilder,
+    scene_graph: SceneGraph,
+    name: str,
+    config: CameraConfig,
+    X_PC: RigidTransform,
+    parent: FrameId | None = None,
+) -> RgbdSensor:
+    """Adds a sensor.
+
+    Args:
+        builder: Gets the sensor.
+        scene_graph: Has a renderer named `RENDERER`.
+        name: Name of the system.
+        config: Size, focal length and range.
+        X_PC: Pose of the camera, its z axis forward, in its parent frame.
+        parent: The frame; the world by default.
+    """
+    # The optical axis in the middle of the image. Drake's own default is half a pixel less, which
+    # draws what is straight ahead half a pixel off it (2 mm at 2 m).
+    centre = 0.5 * config.width, 0.5 * config.height
+    info = CameraInfo(config.width, config.height, config.focal_px, config.focal_px, *centre)
+    core = RenderCameraCore(RENDERER, info, ClippingRange(*_CLIPPING_M), RigidTransform())
+    sensor = RgbdSensor(
+        scene_graph.world_frame_id() if parent is None else parent,
+        X_PC,
+        ColorRenderCamera(core),
+        DepthRenderCamera(core, DepthRange(config.nearest_m, config.furthest_m)),
+    )
+    builder.AddNamedSystem(name, sensor)
+    builder.Connect(scene_graph.get_query_output_port(), sensor.query_object_input_port())
+    return sensor
+
+
+def add_prop(scene_graph: SceneGraph, name: str, shape: Shape, p_WO: Vector, color: Vector) -> None:
+    """Adds a fixed thing that only cameras see; `color` is RGBA, shape (4,)."""
+    source = scene_graph.RegisterSource(name)
+    geometry = scene_graph.RegisterAnchoredGeometry(
+        source, GeometryInstance(RigidTransform(p_WO), shape, name)
+    )
+    properties = PerceptionProperties()
+    properties.AddProperty("phong", "diffuse", Rgba(*color))
+    properties.AddProperty("label", "id", RenderLabel.kDontCare)
+    scene_graph.AssignRole(source, geometry, properties)
+
+
+def look_at(p_WC: Sequence[float], target: Sequence[float]) -> RigidTransform:
+    """Returns X_WC of a camera that looks at a point, its x axis level.
+
+    Args:
+        p_WC: Where the camera is, (x, y, z), metres.
+        target: What it looks at, not directly above or below it, (x, y, z), metres.
+    """
+    z = np.subtract(target, p_WC)
+    z /= np.linalg.norm(z)
+    x = np.cross(z, [0.0, 0.0, 1.0])
+    x /= np.linalg.norm(x)
+    R_WC = RotationMatrix(np.column_stack([x, np.cross(z, x), z]))
+    return RigidTransform(R_WC, np.array(p_WC))

@@ -1,0 +1,166 @@
+"""The robot's belief about board, apertures and goal before each attempt, from its cameras."""
+
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lic_drake.clutter.board import ApertureBoard
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.errors import PerceptionError, ScenarioError
+from lic_drake.perception.board_grid import BoardModel
+from lic_drake.perception.camera_station import CameraStation, Look
+from lic_drake.perception.config import CamerasConfig
+from lic_drake.reach.pointing_starts import PointingStarts, pointing_starts
+from lic_drake.reach.request import ReachRecord
+from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.starts import Starts
+from lic_drake.seeds import make_generator
+from lic_drake.types import Vector
+
+LEAST_PROBABILITY = 0.5
+"""Apertures that are less likely open are treated as blocked."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Belief:
+    """The robot's belief about the board, the apertures and the goal.
+
+    Attributes:
+        look: What it saw.
+        p_WG: Believed position of the goal, shape (3,), metres.
+        starts: The initial conditions at the apertures that are believed open.
+        index: Indices of these apertures in `look.apertures`, shape (k,).
+    """
+
+    look: Look
+    p_WG: Vector
+    starts: PointingStarts
+    index: NDArray[np.intp]
+
+    def over_all(self, values: Vector) -> Vector:
+        """Returns values of the open apertures, shape (k,), with NaN for all others, shape (n,)."""
+        all_values = np.full(len(self.look.apertures.p_WA), np.nan)
+        all_values[self.index] = values
+        return all_values
+
+
+@dataclass(kw_only=True)
+class Observer:
+    """Looks at one environment before every attempt and remembers what was seen.
+
+    Attributes:
+        scenario: The scenario.
+        stream: Seed stream of the environment, and of the cameras' errors.
+        environment: Its index.
+        p_WG: True position of the ball, shape (3,), metres.
+        cameras: The cameras.
+        moves: Whether base and torso may move.
+    """
+
+    scenario: Scenario
+    stream: str
+    environment: int
+    p_WG: Vector
+    cameras: CamerasConfig
+    moves: bool = True
+    _station: CameraStation | None = field(default=None, init=False, repr=False)
+    _beliefs: dict[int, Belief] = field(default_factory=dict, init=False, repr=False)
+
+    def __call__(self, number: int) -> tuple[Vector, Starts]:
+        """Returns the believed p_WG, shape (3,), metres, and starts before an attempt, from 0."""
+        belief = self.belief(number)
+        return belief.p_WG, belief.starts
+
+    def belief(self, number: int) -> Belief:
+        """Returns the belief before an attempt, from 0.
+
+        Raises:
+            RenderingError: Cameras cannot be simulated on this machine.
+            PerceptionError: The board or the ball is not in view, or no aperture looks open.
+        """
+        if number not in self._beliefs:
+            if self._station is None:
+                self._station = CameraStation(
+                    self.scenario.sample_instance(self.stream, self.environment),
+                    self.p_WG,
+                    self.cameras,
+                    board_of(self.scenario)[1],
+                    partial(make_generator, self.stream, "camera errors", self.environment),
+                )
+            look = self._station.look(number)
+            self._beliefs[number] = estimate_board(self.scenario, look, self.moves)
+        return self._beliefs[number]
+
+    def touches_ball(self, record: ReachRecord) -> bool:
+        """Returns whether a reach that came to its believed goal ended inside the ball."""
+        end = np.array([record.final_x, record.final_y, record.final_z])
+        distance = float(np.linalg.norm(end - self.p_WG))
+        return record.success and distance <= self.cameras.ball_radius_m
+
+
+def board_of(scenario: Scenario) -> tuple[ApertureBoard, BoardModel]:
+    """Returns the board of a scenario, and what perception may know of it.
+
+    Raises:
+        ScenarioError: It has none.
+    """
+    board = scenario.clutter
+    if not isinstance(board, ApertureBoard):
+        raise ScenarioError(f"{scenario.category} has no board; use foliage-aperture-clutter")
+    return board, BoardModel(rows=board.rows, columns=board.columns, aperture_m=board.aperture_m)
+
+
+def estimate_board(scenario: Scenario, look: Look, moves: bool = True) -> Belief:
+    """Returns the belief after a look.
+
+    The robot knows the size of the board and of its bars, and that the board is upright and
+    perpendicular to x; where the board is, and what is open, it has seen.
+
+    Args:
+        scenario: Gives the size of the board, the robot, and where base and torso may be.
+        look: What was seen.
+        moves: Whether base and torso may move.
+
+    Raises:
+        PerceptionError: No aperture looks open, or the board is at an impossible place.
+    """
+    board, _ = board_of(scenario)
+    found = look.apertures
+    index = np.flatnonzero(found.probability_open > LEAST_PROBABILITY)
+    if len(index) == 0:
+        raise PerceptionError(
+            f"none of {len(found.p_WA)} apertures looks open; look again, or from another place"
+        )
+    try:
+        seen = replace(board, board_centre=found.p_WA.mean(axis=0).tolist())
+    except ScenarioError as error:
+        raise PerceptionError(f"the board was seen at an impossible place: {error}") from None
+    # `board_of` has checked that the scenario's clutter is a board.
+    believed = replace(scenario, clutter=seen)  # type: ignore[arg-type]
+    stand = believed.task.stand if moves else None
+    starts = pointing_starts(believed, _with_covers(seen, index), stand)
+    return Belief(
+        look=look,
+        p_WG=look.goal.p_WG,
+        starts=replace(starts, probability_open=found.probability_open[index]),
+        index=index,
+    )
+
+
+def _with_covers(board: ApertureBoard, index: NDArray[np.intp]) -> ClutterInstance:
+    """Returns a board with covers, as thick as its bars, in all apertures but these."""
+    bare, p_WA = board.bare_board(), board.aperture_centres()
+    covered = np.delete(p_WA, index, axis=0)
+    k, edge = len(covered), board.aperture_m
+    return replace(
+        bare,
+        shape=bare.shape + ("box",) * k,
+        size=np.vstack([bare.size, np.tile([board.bar_m, edge, edge], (k, 1))]),
+        p_WO=np.vstack([bare.p_WO, covered]),
+        yaw=np.zeros(len(bare.yaw) + k),
+        mass=np.ones(len(bare.mass) + k),
+        movable=np.zeros(len(bare.movable) + k, dtype=bool),
+        p_WA=p_WA[index],
+    )
