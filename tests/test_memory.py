@@ -24,10 +24,11 @@ from lic_drake.reach import rollout, simulation_pool
 from lic_drake.reach.diagram import ReachDiagram, make_reach_diagram
 from lic_drake.reach.environment import Environment
 from lic_drake.reach.pointing_starts import pointing_starts
-from lic_drake.reach.request import make_request
+from lic_drake.reach.request import ReachRequest
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.simulation_pool import SimulationPool
+from lic_drake.reach.start import Start
 from lic_drake.show import recording
 from lic_drake.show.recording import ReachRecording
 
@@ -74,8 +75,8 @@ def test_environments_bases_and_histories_share_a_diagram(
     request = reach_request(small_clutter(0.04))
     for environment in range(5):
         run_reach(replace(request, environment=environment))
-    run_reach(replace(request, base=(0.0, 0.05)))
-    run_reach(request.then(np.array(request.start), np.zeros(2)))
+    run_reach(replace(request, start=Start(request.start.x0, np.array([0.0, 0.05, 0.0]))))
+    run_reach(request.then(request.start))
     assert len(built) == len(ONE_DIAGRAM)
     assert alive(built) == ONE_DIAGRAM
     forget()
@@ -106,7 +107,7 @@ def test_a_reach_in_contact_leaves_nothing(built: list["weakref.ref[Any]"]) -> N
     scenario = free_space(1.0)
     wall = make_clutter(box(0.4, 0.0, (0.04, 0.8, 0.2)))
     environment = Environment(scenario, wall)
-    x0 = np.array(reach_request(scenario).start)
+    x0 = reach_request(scenario).start.x0
     _, trace, _ = environment.reach(np.array([0.7, 0.0, 0.0]), x0)
     assert max(trace.contacts) > 0
     del environment
@@ -120,7 +121,7 @@ def test_reaches_of_the_pr2_leave_nothing(built: list["weakref.ref[Any]"]) -> No
         instance = scenario.sample_instance("training", environment)
         starts = pointing_starts(scenario, instance).grid
         p_WG = scenario.goals("training", environment)[4]
-        run_reach(make_request(scenario, "training", environment, p_WG, starts.x0[7]))
+        run_reach(ReachRequest(scenario, "training", environment, p_WG, starts[7]))
     assert len(built) >= 2 * len(ONE_DIAGRAM)
     forget()
     assert alive(built) == []
@@ -147,7 +148,7 @@ def test_failures_and_invalid_starts_leave_nothing(
 def test_a_recording_dies(built: list["weakref.ref[Any]"], tmp_path: Path) -> None:
     scenario = free_space(0.2)
     clutter = make_clutter(cylinder(0.5, 0.3, movable=True))
-    x0, p_WG = np.array(reach_request(scenario).start), np.array([0.6, 0.1, 0.0])
+    x0, p_WG = reach_request(scenario).start.x0, np.array([0.6, 0.1, 0.0])
     environment = Environment(scenario, clutter)
     result = environment.reach(p_WG, x0, keep_states=True)
     recorded = ReachRecording(scenario, clutter)

@@ -7,8 +7,9 @@ import numpy as np
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import RequestError
 from lic_drake.reach.pointing_starts import PointingStarts, pointing_starts
-from lic_drake.reach.request import ReachRequest, check_goal, make_request
+from lic_drake.reach.request import ReachRequest, check_goal
 from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.start import Start
 from lic_drake.types import Vector
 
 
@@ -37,7 +38,7 @@ def asked_reach(scenario: Scenario, args: argparse.Namespace) -> ReachRequest:
     if not np.all(np.isfinite(x0)):
         raise RequestError(f"a start is two finite numbers, got y {y_m} m, phi {phi_deg} degrees")
     check_goal(scenario, p_WG)
-    return make_request(scenario, args.stream, args.environment, p_WG, x0)
+    return ReachRequest(scenario, args.stream, args.environment, p_WG, Start(x0))
 
 
 def _goal(scenario: Scenario, in_space: bool, args: argparse.Namespace) -> Vector:
@@ -66,14 +67,15 @@ def _through_an_aperture(
         p_WA = starts.p_WA[np.argmin(np.linalg.norm(starts.p_WA[:, 1:] - p_WG[1:], axis=1))]
     else:
         p_WA = starts.nearest_aperture(*args.aperture)
-    found = starts.pre_select(p_WA, np.array([0.0, y_m, torso_m]))
+    b0 = np.array([0.0, y_m, torso_m])
+    found = starts.pre_select(p_WA, b0)
     if found is None:
         raise RequestError(
             f"from base y {y_m:g} m, torso {torso_m:g} m the arm cannot be in the aperture at y"
             f" {p_WA[1]:.3f} m, z {p_WA[2]:.3f} m; choose another --base-y, --torso or --aperture"
         )
-    p_WR = np.array([0.0, y_m])
-    return make_request(scenario, args.stream, args.environment, p_WG, found[0], p_WR, torso_m)
+    start = Start(found[0], b0)
+    return ReachRequest(scenario, args.stream, args.environment, p_WG, start)
 
 
 def _check_stand(starts: PointingStarts, y_m: float, torso_m: float) -> None:

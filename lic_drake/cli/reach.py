@@ -150,20 +150,20 @@ def _draw(request: "ReachRequest", path: Path) -> None:
 
 
 def _record(request: "ReachRequest", path: Path) -> None:
-    import numpy as np
 
     from lic_drake.reach.rollout import instance_of, simulate_request
     from lic_drake.show.recording import ReachRecording
 
-    recording = ReachRecording(request.scenario, instance_of(request), request.torso)
-    recording.add_reach(simulate_request(request, keep_states=True).trace, np.array(request.goal))
+    recording = ReachRecording(request.scenario, instance_of(request), float(request.start.b0[2]))
+    recording.add_reach(simulate_request(request, keep_states=True).trace, request.goal)
     recording.save(path)
 
 
 def _describe_start(request: "ReachRequest") -> str:
-    if len(request.start) == 3:
-        return f"y {request.start[1]:g} m, phi {math.degrees(request.start[2]):g} degrees"
-    return "the aperture at y {:g} m, z {:g} m".format(*request.start[1:3])
+    x0 = request.start.x0
+    if len(x0) == 3:
+        return f"y {x0[1]:g} m, phi {math.degrees(x0[2]):g} degrees"
+    return f"the aperture at y {x0[1]:g} m, z {x0[2]:g} m"
 
 
 def _describe(record: "ReachRecord") -> str:

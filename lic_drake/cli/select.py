@@ -93,15 +93,17 @@ def run(args: argparse.Namespace) -> int:
         added=added_columns(library),
     )
     chosen = selector.select(situation)
+    x0, b0, q = chosen.start.x0, chosen.start.b0, chosen.start.q
+    assert q is not None
     if args.json:
         print(
             json.dumps(
                 {
                     "method": chosen.method,
-                    "start": chosen.x0.tolist(),
-                    "base": chosen.p_WR.tolist(),
-                    "torso": chosen.torso_m,
-                    "joint_angles": chosen.q.tolist(),
+                    "start": x0.tolist(),
+                    "base": b0[:2].tolist(),
+                    "torso": float(b0[2]),
+                    "joint_angles": q.tolist(),
                     "estimated_success": chosen.probability,
                     "seconds": chosen.seconds,
                 }
@@ -113,17 +115,16 @@ def run(args: argparse.Namespace) -> int:
         if chosen.probability is None
         else f", estimated success {100 * chosen.probability:.1f} %"
     )
-    base = "" if not np.any(starts.grid.p_WR) else f", base at y {chosen.p_WR[1]:+.3f} m"
+    base = "" if not np.any(starts.grid.b0[:, :2]) else f", base at y {b0[1]:+.3f} m"
     if instance.num_axes == 2:
-        where = f"start at y {chosen.x0[1]:+.3f} m, phi {np.rad2deg(chosen.x0[2]):+.1f} degrees"
+        where = f"start at y {x0[1]:+.3f} m, phi {np.rad2deg(x0[2]):+.1f} degrees"
     else:
         where = (
-            f"start in the aperture at y {chosen.x0[1]:+.3f} m, z {chosen.x0[2]:.3f} m, torso at"
-            f" {chosen.torso_m:.3f} m"
+            f"start in the aperture at y {x0[1]:+.3f} m, z {x0[2]:.3f} m, torso at {b0[2]:.3f} m"
         )
     print(
         f"{chosen.method}: {where}{base}{estimate}; joint angles"
-        f" {np.round(np.rad2deg(chosen.q), 1).tolist()} degrees; {chosen.seconds:.2f} s"
+        f" {np.round(np.rad2deg(q), 1).tolist()} degrees; {chosen.seconds:.2f} s"
     )
     return 0
 
@@ -137,10 +138,12 @@ def _failed_start(scenario: "Scenario", starts: "Starts", y: float, other: float
     import numpy as np
 
     from lic_drake.reach.pointing_starts import PointingStarts
+    from lic_drake.reach.start import Start
     from lic_drake.select.situation import FailedReach
 
     if not isinstance(starts, PointingStarts):
         x0 = np.array([scenario.task.start_line.x_m, y, np.deg2rad(other)])
-        return FailedReach.from_start(x0)
+        return FailedReach.from_start(Start(x0))
     x0 = np.array([*starts.nearest_aperture(y, other), 1.0, 0.0, 0.0, 0.0])
-    return FailedReach.from_start(x0, torso_m=scenario.task.torso_m)
+    b0 = np.array([0.0, 0.0, scenario.task.torso_m])
+    return FailedReach.from_start(Start(x0, b0))

@@ -7,7 +7,7 @@ from multiprocessing import get_context
 
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.experience.workers import prepare_worker
-from lic_drake.reach.request import ReachRecord, ReachRequest, make_request
+from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.starts import make_starts
@@ -35,18 +35,8 @@ def random_requests(
             index = 0 if scenario.task.goal_area is None else goal
             p_WG = scenario.sample_goal(stream, environment, index)
             rng = make_generator(stream, "rnd", environment, goal)
-            i = rng.integers(len(starts.x0))
-            requests.append(
-                make_request(
-                    scenario,
-                    stream,
-                    environment,
-                    p_WG,
-                    starts.x0[i],
-                    starts.p_WR[i],
-                    float(starts.torso_m[i]),
-                )
-            )
+            start = starts[int(rng.integers(len(starts)))]
+            requests.append(ReachRequest(scenario, stream, environment, p_WG, start))
     return requests
 
 

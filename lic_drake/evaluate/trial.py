@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lic_drake.reach.request import ReachRecord, ReachRequest, make_request
+from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.starts import Starts, make_starts
@@ -62,17 +62,9 @@ def run_trial(
         failed = tuple(FailedReach.from_record(attempt.record) for attempt in done)
         selection = selector.select(Situation(p_WG=p_seen, starts=starts, failed=failed))
         if done and not fresh and np.array_equal(p_seen, done[-1].request.goal):
-            request = done[-1].request.then(selection.x0, selection.p_WR, selection.torso_m)
+            request = done[-1].request.then(selection.start)
         else:
-            request = make_request(
-                scenario,
-                stream,
-                environment,
-                p_seen,
-                selection.x0,
-                selection.p_WR,
-                selection.torso_m,
-            )
+            request = ReachRequest(scenario, stream, environment, p_seen, selection.start)
         done.append(Attempt(selection=selection, request=request, record=reach(request)))
         if done[-1].record.success:
             break

@@ -16,9 +16,9 @@ from lic_drake.config import read_mapping
 from lic_drake.errors import LibraryError, RequestError, ScenarioError
 from lic_drake.experience.files import readable_errors, write_atomically
 from lic_drake.experience.schema import scenario_text
-from lic_drake.reach.initial_conditions import InitialConditions
-from lic_drake.reach.request import ReachRequest, make_request
+from lic_drake.reach.request import ReachRequest
 from lic_drake.reach.scenario import Scenario, parse_scenario
+from lic_drake.reach.start import Starts
 from lic_drake.reach.starts import training_starts
 from lic_drake.seeds import STREAMS
 from lic_drake.types import Vector
@@ -83,7 +83,7 @@ class CollectionRequest:
         index = self.first_environment if environment is None else environment
         return _thin(self.scenario.goals(self.stream, index), self.max_goals)
 
-    def starts(self, environment: int | None = None) -> InitialConditions:
+    def starts(self, environment: int | None = None) -> Starts:
         """Returns the m initial conditions in an environment.
 
         m is the same in all but where base and torso of a robot are not.
@@ -107,9 +107,9 @@ class CollectionRequest:
         """Returns the reaches into one environment; the starts vary fastest."""
         starts = self.starts(environment)
         return [
-            make_request(self.scenario, self.stream, environment, p_WG, x0, p_WR, torso_m)
+            ReachRequest(self.scenario, self.stream, environment, p_WG, start)
             for p_WG in self.goals(environment)
-            for x0, p_WR, torso_m in zip(starts.x0, starts.p_WR, starts.torso_m, strict=True)
+            for start in starts
         ]
 
     def num_reaches(self, environments: Sequence[int]) -> int:

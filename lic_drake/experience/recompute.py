@@ -9,7 +9,7 @@ import numpy as np
 from lic_drake.errors import LibraryError
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.experience.task import ReachFunction, simulate
-from lic_drake.reach.request import ReachRecord, request_of
+from lic_drake.reach.request import ReachRecord, ReachRequest
 
 NOT_COMPARED = ("wall_time_s", "lic_drake_version", "drake_version")
 """What a repetition may change without being another reach."""
@@ -64,7 +64,7 @@ def recompute(
     picked.sort(key=lambda row: (row.stream, row.environment))
     differing: list[Difference] = []
     for done, row in enumerate(picked, start=1):
-        again = reach(request_of(row, scenario))
+        again = reach(ReachRequest.from_record(row, scenario))
         names = _differing_fields(row, again)
         if names:
             outcomes = (row.outcome, again.outcome)

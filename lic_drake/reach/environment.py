@@ -58,7 +58,9 @@ class Environment:
         elif sleep and can_sleep(instance):
             self._waking = WakingSimulation(scenario, self._in_R, torso_m, pool)
 
-    def reach(self, p_WG: Vector, x0: Vector, keep_states: bool = False) -> ReachResult:
+    def reach(
+        self, p_WG: Vector, x0: Vector, keep_states: bool = False, q: Vector | None = None
+    ) -> ReachResult:
         """Simulates a reach.
 
         A redundant arm starts in the first of its configurations for the start pose, in the arm's
@@ -68,6 +70,7 @@ class Environment:
             p_WG: Goal, shape (3,), metres.
             x0: Start pose of the hand.
             keep_states: Whether the trace is to hold the whole scene.
+            q: Joint angles to begin with, shape (m,), radians; by default the first as above.
 
         Returns:
             How it ended. A goal out of the arm's reach is known to fail without simulating it.
@@ -77,7 +80,7 @@ class Environment:
             return ReachResult("unreachable", ReachTrace(), "the goal is beyond the arm's reach")
         x0_R = x0.copy()
         x0_R[:2] -= self.p_WR[:2]
-        angles = self.arm.start_angles(x0_R)
+        angles = self.arm.start_angles(x0_R) if q is None else q[None]
         if not len(angles):
             return ReachResult(
                 "invalid_start", ReachTrace(), "no configuration within the joint limits"

@@ -10,8 +10,8 @@ import numpy as np
 from lic_drake.clutter.board import ApertureBoard
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import RequestError, ScenarioError
-from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.start import Starts
 from lic_drake.reach.task import Stand
 from lic_drake.robots.pr2 import Pr2Arm, pr2_arm
 from lic_drake.robots.pr2_inverse import (
@@ -32,7 +32,7 @@ TOLERANCE = 1e-6
 
 @dataclass(frozen=True, kw_only=True)
 class PointingStarts:
-    """Initial conditions at the open apertures of an environment; satisfies `Starts`.
+    """Initial conditions at the open apertures of an environment.
 
     The redundant arm has one pre-selected configuration for each: of those in which it touches
     neither board nor body the one of least cost, Eq. (5).
@@ -102,7 +102,7 @@ class PointingStarts:
         return CollisionChecker(Pr2Arm(mobile=True), self.instance, self.scenario.scene)
 
     @property
-    def grid(self) -> InitialConditions:
+    def grid(self) -> Starts:
         """All open apertures, from places of the base and heights of the torso in equal steps."""
         return self._table[0]
 
@@ -145,7 +145,7 @@ class PointingStarts:
         return next(_pre_select(self.checker, p_WA[None], b0))
 
     @cached_property
-    def _table(self) -> tuple[InitialConditions, Vector]:
+    def _table(self) -> tuple[Starts, Vector]:
         bare, stand = self._bare_board, self.stand
         conditions, q = _preselect(
             _rows(np.hstack([bare.p_WO, bare.size])),
@@ -224,7 +224,7 @@ def _preselect(
     p_WA: tuple[tuple[float, ...], ...],
     places: tuple[float, ...],
     heights: tuple[float, ...],
-) -> tuple[InitialConditions, Vector]:
+) -> tuple[Starts, Vector]:
     """Returns the initial conditions of a board, n, and their joint angles, shape (n, 7).
 
     All environments have the same board, but for what is blocked.
@@ -238,17 +238,15 @@ def _preselect(
     checker = CollisionChecker(
         Pr2Arm(mobile=True), _board(np.array(boxes).reshape(-1, 6)), SceneConfig()
     )
-    x0, p_WR, torso, angles = [], [], [], []
+    x0, bases, angles = [], [], []
     for y_m, torso_m in product(places, heights):
-        for found in _pre_select(checker, np.array(p_WA), np.array([0.0, y_m, torso_m])):
+        b0 = np.array([0.0, y_m, torso_m])
+        for found in _pre_select(checker, np.array(p_WA), b0):
             if found is not None:
                 x0.append(found[0])
-                p_WR.append(np.array([0.0, y_m]))
-                torso.append(torso_m)
+                bases.append(b0)
                 angles.append(found[1])
-    conditions = InitialConditions(
-        np.array(x0).reshape(-1, 7), np.array(p_WR).reshape(-1, 2), np.array(torso)
-    )
+    conditions = Starts(np.array(x0).reshape(-1, 7), np.array(bases).reshape(-1, 3))
     return conditions, np.array(angles).reshape(-1, 7)
 
 

@@ -3,12 +3,14 @@
 import hashlib
 import json
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from functools import cached_property
+from typing import Self
 
 import numpy as np
 
 from lic_drake.errors import RequestError
 from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.start import IN_PLANE, IN_SPACE, POSE_AXES, Start
 from lic_drake.robots.arm import Arm
 from lic_drake.types import Vector
 
@@ -18,151 +20,150 @@ failure of the simulator; before it began, because the arm cannot stand at the s
 the goal is further away than the arm is long."""
 
 
-IN_PLANE, IN_SPACE = 3, 7
-"""Lengths of hand poses in the plane and in space."""
-
-_POSES = {IN_PLANE: "x, y, phi", IN_SPACE: "x, y, z, qw, qx, qy, qz"}
-
-
-class EarlierReach(NamedTuple):
-    """A reach to the same goal that went before and left the environment as it is found.
-
-    Attributes:
-        start: Hand pose x0 that it began with, in W; in the plane (x, y, phi), metres and radians,
-            in space position and quaternion (x, y, z, qw, qx, qy, qz).
-        base: p_WR in the plane, (x, y), metres.
-        torso: Height of the robot's torso, metres; 0 for a robot without one.
-    """
-
-    start: tuple[float, ...]
-    base: tuple[float, float]
-    torso: float = 0.0
-
-    def flat(self) -> tuple[float, ...]:
-        """Returns its numbers one after the other; the torso only where there may be one."""
-        return (*self.start, *self.base, *((self.torso,) if len(self.start) == IN_SPACE else ()))
-
-
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class ReachRequest:
-    """One reach to simulate. The record is a pure function of it.
+    """One reach to simulate. The record is a pure function of it; equal requests have equal keys.
 
     Attributes:
         scenario: Category, robot, contact, controller and stop rules.
         stream: Seed stream of the environment, one of `lic_drake.seeds.STREAMS`.
         environment: Index of the environment in its stream.
-        goal: p_WG, (x, y, z), metres.
-        start: Hand pose x0 in W; in the plane (x, y, phi), metres and radians, in space position
-            and quaternion (x, y, z, qw, qx, qy, qz).
-        base: Where the mobile base stands during the reach, p_WR in the plane, (x, y), metres.
-        torso: Height of the robot's torso, metres; 0 for a robot without one.
-        after: Reaches to the same goal that went before, in their order; without any the
-            environment is as it was drawn.
+        goal: p_WG, shape (3,), metres.
+        start: Where it begins. Joint angles that are all that the arm can have there are left out.
+        after: Starts of reaches to the same goal that went before, in their order, and left the
+            environment as it is found; without any it is as it was drawn.
+
+    Raises:
+        RequestError: The goal is not finite, or the robot has start poses of another kind.
     """
 
     scenario: Scenario
     stream: str
     environment: int
-    goal: tuple[float, float, float]
-    start: tuple[float, ...]
-    base: tuple[float, float] = (0.0, 0.0)
-    torso: float = 0.0
-    after: tuple[EarlierReach, ...] = ()
+    goal: Vector
+    start: Start
+    after: tuple[Start, ...] = ()
 
-    @property
+    def __post_init__(self) -> None:
+        goal = np.array(self.goal, dtype=float)
+        if goal.shape != (3,) or not np.all(np.isfinite(goal)):
+            raise RequestError(f"a goal is three finite numbers in metres, got {goal.tolist()}")
+        goal.flags.writeable = False
+        object.__setattr__(self, "goal", goal)
+        object.__setattr__(self, "start", _checked(self.scenario, self.start))
+        object.__setattr__(self, "after", tuple(_checked(self.scenario, x) for x in self.after))
+
+    def __eq__(self, other: object) -> bool:
+        """Returns whether another request has the same key."""
+        return isinstance(other, ReachRequest) and self.key == other.key
+
+    def __hash__(self) -> int:
+        """Returns the hash of the key."""
+        return hash(self.key)
+
+    @cached_property
     def key(self) -> str:
         """Identifies the request in a library: 16 hexadecimal digits."""
-        content: list[object] = [self.scenario.digest, self.stream, self.environment]
-        content += [self.goal, self.start]
-        # Left out where they are as in libraries from before there were any.
-        if self.base != (0.0, 0.0) or self.after:
-            content += [self.base, [(earlier.start, earlier.base) for earlier in self.after]]
-        if len(self.start) == IN_SPACE:
-            content += [self.torso, [earlier.torso for earlier in self.after]]
+        return self._key(self.scenario.digest)
+
+    def _key(self, digest: str) -> str:
+        """Returns the key for a scenario with a digest."""
+        x0, b0 = self.start.x0.tolist(), self.start.b0.tolist()
+        content: list[object] = [digest, self.stream, self.environment, self.goal.tolist(), x0]
+        # Left out where the base stands at the origin, as in a library of a fixed base.
+        if b0[:2] != [0.0, 0.0] or self.after:
+            content += [b0[:2], [(s.x0.tolist(), s.b0[:2].tolist()) for s in self.after]]
+        if len(x0) == IN_SPACE:
+            content += [b0[2], [float(s.b0[2]) for s in self.after]]
+        prescribed = [None if s.q is None else s.q.tolist() for s in (self.start, *self.after)]
+        if any(prescribed):
+            content.append(prescribed)
         return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
 
-    @property
-    def p_WR(self) -> Vector:
-        """Position of the base, shape (3,), metres."""
-        return np.array([*self.base, 0.0])
+    @classmethod
+    def from_record(cls, record: "ReachRecord", scenario: Scenario) -> Self:
+        """Returns the request that a record answers; `scenario` is the one that it was made with.
+
+        A record holds the joint angles in any case; its key tells whether they were prescribed.
+        """
+        start = record.start
+        plain = Start(start.x0, start.b0)
+        found = [
+            cls(scenario, record.stream, record.environment, record.p_WG, first, after)
+            for after in _read_after(record, len(scenario.arm().q_min))
+            for first in ((plain,) if start.q is None else (plain, start))
+        ]
+        return next((item for item in found if item._key(record.scenario) == record.key), found[0])
 
     def before(self) -> "ReachRequest | None":
         """Returns the request of the reach that went before; None if it is the first."""
         if not self.after:
             return None
-        last = self.after[-1]
-        return replace(
-            self, start=last.start, base=last.base, torso=last.torso, after=self.after[:-1]
-        )
+        return replace(self, start=self.after[-1], after=self.after[:-1])
 
-    def then(self, x0: Vector, p_WR: Vector, torso_m: float | None = None) -> "ReachRequest":
-        """Returns the request of a further reach to the same goal.
-
-        Args:
-            x0: Its start pose, shape (3,), or (7,) in space.
-            p_WR: Its base, shape (2,) or (3,), metres.
-            torso_m: Its torso's height, metres; by default the present one.
-        """
-        earlier = EarlierReach(start=self.start, base=self.base, torso=self.torso)
-        return replace(
-            self,
-            start=_numbers(x0),
-            base=_pair(p_WR),
-            torso=self.torso if torso_m is None else float(torso_m),
-            after=(*self.after, earlier),
-        )
+    def then(self, start: Start) -> "ReachRequest":
+        """Returns the request of a further reach to the same goal from another start."""
+        return replace(self, start=start, after=(*self.after, self.start))
 
 
-def make_request(
-    scenario: Scenario,
-    stream: str,
-    environment: int,
-    p_WG: Vector,
-    x0: Vector,
-    p_WR: Vector | None = None,
-    torso_m: float | None = None,
-) -> ReachRequest:
-    """Returns the request of a first reach from arrays.
-
-    Args:
-        scenario: Category, robot and rules.
-        stream: Seed stream of the environment.
-        environment: Its index.
-        p_WG: Goal, shape (3,), metres.
-        x0: Start pose, shape (3,), or (7,) in space.
-        p_WR: Base, shape (2,) or (3,), metres; by default at the origin.
-        torso_m: Height of the torso, metres; by default as the scenario's task has it.
+def _checked(scenario: Scenario, start: Start) -> Start:
+    """Returns a start of the scenario's robot, without joint angles where there are no others.
 
     Raises:
-        RequestError: The robot has start poses of another kind.
+        RequestError: It is of another kind of robot.
     """
-    size = IN_PLANE if scenario.arm().surface is None else IN_SPACE
-    if x0.shape != (size,):
+    arm = scenario.arm()
+    size = IN_PLANE if arm.surface is None else IN_SPACE
+    if start.x0.shape != (size,):
         raise RequestError(
-            f"a start of {scenario.robot} has {size} numbers ({_POSES[size]}), got {x0.tolist()}"
+            f"a start of {scenario.robot} has {size} numbers ({', '.join(POSE_AXES[size])}), got"
+            f" {start.x0.tolist()}"
         )
-    return ReachRequest(
-        scenario=scenario,
-        stream=stream,
-        environment=environment,
-        goal=_triple(p_WG),
-        start=_numbers(x0),
-        base=(0.0, 0.0) if p_WR is None else _pair(p_WR),
-        torso=scenario.task.torso_m if torso_m is None else float(torso_m),
-    )
+    if start.q is None:
+        return start
+    if start.q.shape != arm.q_min.shape:
+        raise RequestError(
+            f"{scenario.robot} has {len(arm.q_min)} joint angles, the start has {len(start.q)}"
+        )
+    if size == IN_PLANE:
+        only = arm.solve_ik(start.x0_R)
+        if only is not None and np.allclose(start.q, only, rtol=0.0, atol=1e-9):
+            return replace(start, q=None)
+    return start
 
 
-def _numbers(values: Vector) -> tuple[float, ...]:
-    return tuple(np.asarray(values, dtype=float).tolist())
+def flat_starts(after: tuple[Start, ...]) -> tuple[float, ...]:
+    """Returns starts as the numbers of the column `after`.
+
+    They are x0, the base and in space the torso of each, and, if any has joint angles, those; NaN
+    for one without.
+    """
+    angles = next((len(start.q) for start in after if start.q is not None), 0)
+    numbers: list[float] = []
+    for start in after:
+        numbers += start.x0.tolist()
+        numbers += start.b0[: 3 if len(start.x0) == IN_SPACE else 2].tolist()
+        numbers += [np.nan] * angles if start.q is None else start.q.tolist()
+    return tuple(numbers)
 
 
-def _triple(values: Vector) -> tuple[float, float, float]:
-    return float(values[0]), float(values[1]), float(values[2])
-
-
-def _pair(values: Vector) -> tuple[float, float]:
-    # Adding zero makes -0.0 and 0.0 the same base with the same key.
-    return float(values[0]) + 0.0, float(values[1]) + 0.0
+def _read_after(record: "ReachRecord", angles: int) -> list[tuple[Start, ...]]:
+    """Returns what the column `after` of a record can mean, without and with joint angles."""
+    n = len(record.start.x0)
+    b0_size = 3 if n == IN_SPACE else 2
+    numbers, found = np.array(record.after), []
+    for with_angles in (False, True):
+        width = n + b0_size + angles * with_angles
+        if len(numbers) % width == 0:
+            rows = numbers.reshape(-1, width)
+            b0 = np.zeros((len(rows), 3))
+            b0[:, :b0_size] = rows[:, n : n + b0_size]
+            q = [
+                row if np.all(np.isfinite(row)) and len(row) else None
+                for row in rows[:, n + b0_size :]
+            ]
+            found.append(tuple(map(Start, rows[:, :n], b0, q)))
+    return found
 
 
 def _later(unit: str, doc: str) -> float:
@@ -252,29 +253,19 @@ class ReachRecord:
         return np.array([self.goal_x, self.goal_y, self.goal_z])
 
     @property
-    def x0(self) -> Vector:
-        """The start pose: (x, y, phi), or position and quaternion in space, as in the request."""
-        if not self.in_space:
-            return np.array([self.start_x, self.start_y, self.start_phi])
-        quaternion = (self.start_qw, self.start_qx, self.start_qy, self.start_qz)
-        return np.array([self.start_x, self.start_y, self.start_z, *quaternion])
+    def start(self) -> Start:
+        """The start as in the request, with the joint angles that the reach had there, if any."""
+        b0 = np.array([self.base_x, self.base_y, self.torso])
+        return Start(self._pose("start"), b0, np.array(self.q_start) if self.q_start else None)
 
+    @property
+    def final(self) -> Vector:
+        """The final hand pose x_inf in W, shape as that of the start; NaN if it never began."""
+        return self._pose("final")
 
-def request_of(record: ReachRecord, scenario: Scenario) -> ReachRequest:
-    """Returns the request that a record answers; `scenario` is the one that it was made with."""
-    n = len(record.x0)
-    width = n + (3 if record.in_space else 2)
-    rows = [record.after[i : i + width] for i in range(0, len(record.after), width)]
-    return ReachRequest(
-        scenario=scenario,
-        stream=record.stream,
-        environment=record.environment,
-        goal=_triple(record.p_WG),
-        start=_numbers(record.x0),
-        base=(record.base_x, record.base_y),
-        torso=record.torso,
-        after=tuple(EarlierReach(row[:n], (row[n], row[n + 1]), *row[n + 2 :]) for row in rows),
-    )
+    def _pose(self, name: str) -> Vector:
+        axes = POSE_AXES[IN_SPACE if self.in_space else IN_PLANE]
+        return np.array([getattr(self, f"{name}_{axis}") for axis in axes])
 
 
 def check_goal(scenario: Scenario, p_RG: Vector, torso_m: float | None = None) -> None:
@@ -289,7 +280,7 @@ def check_goal(scenario: Scenario, p_RG: Vector, torso_m: float | None = None) -
         RequestError: The goal is not finite or further away than the arm reaches.
     """
     if p_RG.shape != (3,) or not np.all(np.isfinite(p_RG)):
-        raise RequestError(f"a goal is two finite numbers in metres, got {p_RG.tolist()}")
+        raise RequestError(f"a goal is three finite numbers in metres, got {p_RG.tolist()}")
     if not is_within_reach(scenario, p_RG, torso_m):
         arm = scenario.arm(torso_m)
         distance = np.linalg.norm(p_RG - arm.p_RS)

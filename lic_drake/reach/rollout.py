@@ -11,8 +11,9 @@ import numpy as np
 import lic_drake
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.reach.environment import Environment
-from lic_drake.reach.request import IN_SPACE, ReachRecord, ReachRequest
+from lic_drake.reach.request import ReachRecord, ReachRequest, flat_starts
 from lic_drake.reach.simulation_pool import SimulationPool
+from lic_drake.reach.start import IN_SPACE, POSE_AXES
 from lic_drake.reach.trace import ReachResult
 from lic_drake.types import Vector
 
@@ -33,7 +34,7 @@ def environment_of(request: ReachRequest, sleep: bool = True) -> Environment:
     Diagrams of the last few requests of the same drawn environment are kept in this process.
     """
     drawn = (request.scenario.digest, request.stream, request.environment, sleep)
-    key = (*drawn, request.base, request.torso, request.after)
+    key = (*drawn, tuple(request.start.b0.tolist()), request.after)
     if key not in _environments:
         known = next(iter(_environments), drawn)
         if len(_environments) >= MAX_ENVIRONMENTS or known[: len(drawn)] != drawn:
@@ -44,8 +45,8 @@ def environment_of(request: ReachRequest, sleep: bool = True) -> Environment:
             request.scenario,
             instance_of(request),
             sleep,
-            p_WR=request.p_WR,
-            torso_m=request.torso,
+            p_WR=np.append(request.start.b0[:2], 0.0),
+            torso_m=float(request.start.b0[2]),
             pool=_pool,
         )
     return _environments[key]
@@ -69,8 +70,8 @@ def simulate_request(
     request: ReachRequest, sleep: bool = True, keep_states: bool = False
 ) -> ReachResult:
     """Simulates a request and returns how it went, sample by sample; see `Environment.reach`."""
-    p_WG, x0 = np.array(request.goal), np.array(request.start)
-    return environment_of(request, sleep).reach(p_WG, x0, keep_states)
+    start = request.start
+    return environment_of(request, sleep).reach(request.goal, start.x0, keep_states, start.q)
 
 
 def remember_end(request: ReachRequest, result: ReachResult) -> None:
@@ -105,12 +106,12 @@ def make_record(request: ReachRequest, result: ReachResult, wall_time_s: float) 
     outcome, trace, detail = result
     scenario = request.scenario
     nothing = not trace.q
-    start = np.array(request.start)
+    x0, b0 = request.start.x0, request.start.b0
     if nothing:
-        final = np.full(len(start), np.nan)
+        final = np.full(len(x0), np.nan)
     else:
-        final = scenario.arm(request.torso).tip_pose(trace.q[-1])
-    final[:2] += request.base
+        final = scenario.arm(float(b0[2])).tip_pose(trace.q[-1])
+    final[:2] += b0[:2]
     still_s = scenario.stop.stuck_time_s if outcome == "stuck" else 0.0
     velocity = np.full(3, np.nan) if nothing else trace.final_velocity(still_s)
     distances = np.linalg.norm(np.array(trace.p_WE).reshape(-1, 3) - request.goal, axis=1)
@@ -121,9 +122,7 @@ def make_record(request: ReachRequest, result: ReachResult, wall_time_s: float) 
         scenario=scenario.digest,
         stream=request.stream,
         environment=request.environment,
-        goal_x=request.goal[0],
-        goal_y=request.goal[1],
-        goal_z=request.goal[2],
+        **dict(zip(("goal_x", "goal_y", "goal_z"), request.goal.tolist(), strict=True)),
         outcome=outcome,
         success=outcome == "reached",
         final_vx=float(velocity[0]),
@@ -140,24 +139,21 @@ def make_record(request: ReachRequest, result: ReachResult, wall_time_s: float) 
         detail=detail,
         lic_drake_version=lic_drake.__version__,
         drake_version=_drake_version(),
-        base_x=request.base[0],
-        base_y=request.base[1],
-        after=tuple(x for earlier in request.after for x in earlier.flat()),
-        torso=request.torso,
-        final_vz=float(velocity[2]) if len(start) == IN_SPACE else 0.0,
-        **_pose_columns("start", start),
+        base_x=float(b0[0]),
+        base_y=float(b0[1]),
+        after=flat_starts(request.after),
+        torso=float(b0[2]),
+        final_vz=float(velocity[2]) if len(x0) == IN_SPACE else 0.0,
+        **_pose_columns("start", x0),
         **_pose_columns("final", final),
     )
 
 
 def _pose_columns(name: str, x: Vector) -> dict[str, float]:
     """Returns the columns of a hand pose, (x, y, phi) or position and quaternion."""
-    if len(x) != IN_SPACE:
-        axes: tuple[str, ...] = ("x", "y", "phi")
-        return {f"{name}_{axis}": float(value) for axis, value in zip(axes, x, strict=True)}
-    axes = ("x", "y", "z", "qw", "qx", "qy", "qz")
+    axes = POSE_AXES[len(x)]
     columns = {f"{name}_{axis}": float(value) for axis, value in zip(axes, x, strict=True)}
-    return {**columns, f"{name}_phi": 0.0}
+    return {f"{name}_phi": 0.0} | columns
 
 
 @cache

@@ -10,9 +10,9 @@ import numpy as np
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import RequestError
 from lic_drake.reach.hand_poses import HandPoses
-from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.reach.pointing_starts import pointing_starts, standing_at
 from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.start import Starts as StartBatch
 from lic_drake.reach.task import BaseTrack, StartLine
 from lic_drake.robots.pr2 import Pr2Arm
 from lic_drake.robots.registry import get_robot
@@ -53,7 +53,7 @@ class Starts(Protocol):
     """The initial conditions that a robot can choose from in an environment."""
 
     @property
-    def grid(self) -> InitialConditions:
+    def grid(self) -> StartBatch:
         """The discrete ones, from which RND and COST choose."""
         ...
 
@@ -86,7 +86,7 @@ class PlanarStarts(Starts, Protocol):
         ...
 
     @property
-    def lattice(self) -> InitialConditions:
+    def lattice(self) -> StartBatch:
         """A denser set than the grid."""
         ...
 
@@ -128,14 +128,14 @@ class LineStarts:
         return (Region(lower=line.lower, upper=line.upper, base_lower=zeros, base_upper=zeros),)
 
     @cached_property
-    def grid(self) -> InitialConditions:
+    def grid(self) -> StartBatch:
         """The poses of the line's grid."""
-        return InitialConditions(self.poses.grid, np.zeros((len(self.poses.grid), 2)))
+        return StartBatch(self.poses.grid, np.zeros((len(self.poses.grid), 3)))
 
     @cached_property
-    def lattice(self) -> InitialConditions:
+    def lattice(self) -> StartBatch:
         """Poses 0.025 m and 7.5 degrees apart."""
-        return InitialConditions(self.poses.lattice, np.zeros((len(self.poses.lattice), 2)))
+        return StartBatch(self.poses.lattice, np.zeros((len(self.poses.lattice), 3)))
 
     def angles(self, x0: Vector, p_WR: Vector, torso_m: float = 0.0) -> Vector | None:
         """Returns joint angles with which the arm can start so, else None; see `Starts`."""
@@ -171,12 +171,12 @@ class ApertureStarts:
         )
 
     @cached_property
-    def grid(self) -> InitialConditions:
+    def grid(self) -> StartBatch:
         """The poses of the line's grid, each at every aperture if the track allows it."""
         return self._at_apertures(self.poses.grid)
 
     @cached_property
-    def lattice(self) -> InitialConditions:
+    def lattice(self) -> StartBatch:
         """As `grid`, 0.025 m and 7.5 degrees apart or denser."""
         return self._at_apertures(self.poses.lattice)
 
@@ -184,38 +184,39 @@ class ApertureStarts:
         """Returns joint angles with which the arm can start so, else None; see `Starts`."""
         return _planar_angles(self, x0, p_WR)
 
-    def draw(self, rng: np.random.Generator, per_aperture: int) -> InitialConditions:
+    def draw(self, rng: np.random.Generator, per_aperture: int) -> StartBatch:
         """Draws uniformly among the possible ones, the same number at each aperture.
 
         Raises:
             RequestError: The arm reaches an aperture from nowhere on the track.
         """
-        found = InitialConditions(np.empty((0, 3)), np.empty((0, 2)))
+        found = StartBatch(np.empty((0, 3)), np.empty((0, 3)))
         for region in self.regions:
             for _ in range(per_aperture):
                 found = found.join(self._draw_one(rng, region))
         return found
 
-    def _draw_one(self, rng: np.random.Generator, region: Region) -> InitialConditions:
+    def _draw_one(self, rng: np.random.Generator, region: Region) -> StartBatch:
         for _ in range(10_000):
             x0 = rng.uniform(region.lower, region.upper)
             p_WR = rng.uniform(region.base_lower, np.maximum(region.base_lower, region.base_upper))
             if self.poses.contains(x0 - [*p_WR, 0.0]):
-                return InitialConditions(x0[None], p_WR[None])
+                return StartBatch(x0[None], np.array([[*p_WR, 0.0]]))
         raise RequestError(
             f"the arm reaches the aperture at y = {region.lower[1]:.3f} m from nowhere on its"
             " track; widen task.base or the orientations of task.start_line"
         )
 
-    def _at_apertures(self, poses: Vector) -> InitialConditions:
-        found = InitialConditions(np.empty((0, 3)), np.empty((0, 2)))
+    def _at_apertures(self, poses: Vector) -> StartBatch:
+        found = StartBatch(np.empty((0, 3)), np.empty((0, 3)))
         for x, y, _ in self.p_WA:
             p_WR = np.array([x, y]) - poses[:, :2]
             x0 = np.column_stack([np.tile([x, y], (len(poses), 1)), poses[:, 2]])
             low, high = self.track.y_min_m - TOLERANCE, self.track.y_max_m + TOLERANCE
             on_track = (p_WR[:, 1] >= low) & (p_WR[:, 1] <= high)
             # Rounding must not make one base two.
-            found = found.join(InitialConditions(x0, np.round(p_WR, 12)).take(on_track))
+            b0 = np.column_stack([np.round(p_WR, 12), np.zeros(len(p_WR))])
+            found = found.join(StartBatch(x0, b0).take(on_track))
         return found
 
 
@@ -241,7 +242,7 @@ def planar_starts(scenario: Scenario, instance: ClutterInstance) -> LineStarts |
     return ApertureStarts(poses=poses, track=track, p_WA=instance.p_WA)
 
 
-def training_starts(scenario: Scenario, stream: str, environment: int) -> InitialConditions:
+def training_starts(scenario: Scenario, stream: str, environment: int) -> StartBatch:
     """Returns the initial conditions that a collection tries in an environment.
 
     They are one for each aperture for a robot in space (paper IV-B), the grid of a fixed base

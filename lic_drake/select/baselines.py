@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from lic_drake.errors import RequestError
-from lic_drake.reach.initial_conditions import InitialConditions
-from lic_drake.reach.request import IN_PLANE
+from lic_drake.reach.start import IN_PLANE, Start, Starts
 from lic_drake.select.situation import Selection, Situation
 from lic_drake.types import Vector
 
@@ -121,7 +120,7 @@ class CostSelector:
 
 def make_selection(
     situation: Situation,
-    conditions: InitialConditions,
+    conditions: Starts,
     index: int,
     probability: float | None,
     method: str,
@@ -140,20 +139,16 @@ def make_selection(
     Raises:
         RequestError: The arm cannot start there.
     """
-    x0, p_WR = conditions.x0[index], conditions.p_WR[index]
-    torso_m = float(conditions.torso_m[index])
-    q = situation.starts.angles(x0, p_WR, torso_m)
+    x0, b0 = conditions.x0[index], conditions.b0[index]
+    q = situation.starts.angles(x0, b0[:2], float(b0[2]))
     if q is None:
         raise RequestError(
             f"the arm cannot start at {np.round(x0, 4).tolist()} from a base at"
-            f" {np.round(p_WR, 4).tolist()} with the torso at {torso_m:.4f} m"
+            f" {np.round(b0[:2], 4).tolist()} with the torso at {b0[2]:.4f} m"
         )
     return Selection(
-        x0=x0,
-        p_WR=p_WR,
-        q=q,
+        start=Start(x0, b0, q),
         probability=probability,
         method=method,
         seconds=time.perf_counter() - began,
-        torso_m=torso_m,
     )

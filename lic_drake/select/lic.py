@@ -8,7 +8,7 @@ import numpy as np
 
 from lic_drake.errors import RequestError
 from lic_drake.estimate.checks import EstimateError
-from lic_drake.reach.initial_conditions import InitialConditions
+from lic_drake.reach.start import Starts
 from lic_drake.select.baselines import make_selection
 from lic_drake.select.objective import Objective, SuccessModel, SuccessObjective
 from lic_drake.select.situation import FailedReach, Selection, Situation
@@ -70,12 +70,12 @@ class LicSelector(ABC):
             return Objective(model=self.second, p_WG=situation.p_WG, failed=seen)
         return Objective(model=self.first, p_WG=situation.p_WG)
 
-    def _chance(self, situation: Situation, conditions: InitialConditions) -> Vector:
+    def _chance(self, situation: Situation, conditions: Starts) -> Vector:
         """Returns how likely n initial conditions are what they seem to be, shape (n,)."""
         return np.ones(len(conditions))
 
     @abstractmethod
-    def _candidates(self, situation: Situation) -> InitialConditions:
+    def _candidates(self, situation: Situation) -> Starts:
         """Returns possible initial conditions to begin with."""
 
     @abstractmethod
@@ -83,9 +83,9 @@ class LicSelector(ABC):
         self,
         situation: Situation,
         objective: SuccessObjective,
-        candidates: InitialConditions,
+        candidates: Starts,
         values: Vector,
-    ) -> Iterable[InitialConditions]:
+    ) -> Iterable[Starts]:
         """Yields where the optimisation ends from the best candidates, one possible start each.
 
         Args:

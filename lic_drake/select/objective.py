@@ -7,7 +7,7 @@ import numpy as np
 
 from lic_drake.estimate.estimator import SuccessEstimator
 from lic_drake.estimate.features import FeatureMap
-from lic_drake.reach.initial_conditions import InitialConditions
+from lic_drake.reach.start import Starts
 from lic_drake.select.situation import FailedReach
 from lic_drake.types import Vector
 
@@ -28,7 +28,7 @@ class SuccessObjective(Protocol):
         """Failures that are observed; without any, starts near failed ones are ruled out."""
         ...
 
-    def values(self, conditions: InitialConditions) -> Vector:
+    def values(self, conditions: Starts) -> Vector:
         """Returns the unclipped estimates at n initial conditions, shape (n,)."""
         ...
 
@@ -59,7 +59,7 @@ class Objective:
     p_WG: Vector
     failed: tuple[FailedReach, ...] = ()
 
-    def values(self, conditions: InitialConditions) -> Vector:
+    def values(self, conditions: Starts) -> Vector:
         """Returns the unclipped estimates at n initial conditions, shape (n,)."""
         features = self.model.features
         p_RG, x0 = self.p_WG - conditions.b0, conditions.in_R

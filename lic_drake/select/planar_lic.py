@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.optimize import minimize
 
-from lic_drake.reach.initial_conditions import InitialConditions
+from lic_drake.reach.start import Starts
 from lic_drake.reach.starts import Region, find_region, is_possible
 from lic_drake.robots.planar import PlanarArm
 from lic_drake.select.lic import LicSelector
@@ -33,21 +33,21 @@ class PlanarLic(LicSelector):
         self._arm = arm
         self._program = PlanarProgram(arm.kinematics)
 
-    def _candidates(self, situation: Situation) -> InitialConditions:
+    def _candidates(self, situation: Situation) -> Starts:
         return situation.planar_starts.grid.join(situation.planar_starts.lattice)
 
     def _improve(
         self,
         situation: Situation,
         objective: SuccessObjective,
-        candidates: InitialConditions,
+        candidates: Starts,
         values: Vector,
-    ) -> Iterator[InitialConditions]:
+    ) -> Iterator[Starts]:
         starts = situation.planar_starts
         regions = starts.regions if objective.failed else situation.free_regions()
         for i in np.argsort(-values, kind="stable")[:NUM_SOLVES]:
             improved = self._solve(
-                situation, objective, regions, candidates.x0[i], candidates.p_WR[i]
+                situation, objective, regions, candidates.x0[i], candidates.b0[i, :2]
             )
             if improved is not None:
                 yield improved
@@ -59,7 +59,7 @@ class PlanarLic(LicSelector):
         regions: tuple[Region, ...],
         x0: Vector,
         p_WR: Vector,
-    ) -> InitialConditions | None:
+    ) -> Starts | None:
         """Returns where the optimisation ends from a candidate, None if that is not possible."""
         region = find_region(regions, x0, p_WR)
         q = self._arm.solve_ik(x0 - [*p_WR, 0.0])
@@ -71,7 +71,7 @@ class PlanarLic(LicSelector):
         p_WR = np.clip(p_WR, region.base_lower, region.base_upper)
         if not is_possible(situation.planar_starts, x0, p_WR):
             return None
-        return InitialConditions(x0[None], p_WR[None])
+        return Starts(x0[None], np.array([[*p_WR, 0.0]]))
 
 
 class PlanarLbfgsb(PlanarLic):
@@ -88,7 +88,7 @@ class PlanarLbfgsb(PlanarLic):
         regions: tuple[Region, ...],
         x0: Vector,
         p_WR: Vector,
-    ) -> InitialConditions | None:
+    ) -> Starts | None:
         poses = situation.planar_starts.poses
         region = find_region(regions, x0, p_WR)
         if region is None:
@@ -132,4 +132,4 @@ class PlanarLbfgsb(PlanarLic):
         x0, p_WR, _, _ = condition(result.x)
         if not is_possible(situation.planar_starts, x0, p_WR):
             return None
-        return InitialConditions(x0[None], p_WR[None])
+        return Starts(x0[None], np.array([[*p_WR, 0.0]]))

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from lic_drake.errors import RequestError
-from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.reach.pointing_starts import PointingStarts
+from lic_drake.reach.start import Starts
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.objective import SuccessObjective
 from lic_drake.select.pointing_places import LATTICE_M, find_neighbours, make_lattice
@@ -49,20 +49,20 @@ class PointingLic(LicSelector):
     at least `RETRY_M` from where they were.
     """
 
-    def _candidates(self, situation: Situation) -> InitialConditions:
+    def _candidates(self, situation: Situation) -> Starts:
         grid = _pointing(situation).grid
         return grid.take(is_apart(situation, grid))
 
-    def _chance(self, situation: Situation, conditions: InitialConditions) -> Vector:
+    def _chance(self, situation: Situation, conditions: Starts) -> Vector:
         return _pointing(situation).chance(conditions.x0)
 
     def _improve(
         self,
         situation: Situation,
         objective: SuccessObjective,
-        candidates: InitialConditions,
+        candidates: Starts,
         values: Vector,
-    ) -> Iterator[InitialConditions]:
+    ) -> Iterator[Starts]:
         starts = _pointing(situation)
         places, found = self._search(situation, objective, candidates, values)
         best = float(values.max())
@@ -74,7 +74,7 @@ class PointingLic(LicSelector):
             if start is None:
                 continue
             for pose, b0 in (start, self._solve(starts, objective, *start)):
-                condition = InitialConditions(pose[None], b0[None, :2], b0[2:])
+                condition = Starts(pose[None], b0[None])
                 possible = starts.angles(pose, b0[:2], b0[2]) is not None
                 if possible and is_apart(situation, condition)[0]:
                     yield condition
@@ -85,9 +85,9 @@ class PointingLic(LicSelector):
         self,
         situation: Situation,
         objective: SuccessObjective,
-        candidates: InitialConditions,
+        candidates: Starts,
         values: Vector,
-    ) -> tuple[InitialConditions, Vector]:
+    ) -> tuple[Starts, Vector]:
         """Returns places at all apertures, denser where estimates are high, and the estimates.
 
         An aperture has the tool pose of its best candidate.
@@ -110,9 +110,7 @@ class PointingLic(LicSelector):
             found = np.append(found, self._values(situation, objective, nearby))
         return places, found
 
-    def _values(
-        self, situation: Situation, objective: SuccessObjective, places: InitialConditions
-    ) -> Vector:
+    def _values(self, situation: Situation, objective: SuccessObjective, places: Starts) -> Vector:
         """Returns the estimates of n places, -inf for those that are not allowed, shape (n,)."""
         values = objective.values(places) * self._chance(situation, places)
         return np.where(is_apart(situation, places), values, -np.inf)
@@ -167,18 +165,17 @@ def _pose(p_WA: Vector, half_roll: float) -> Vector:
     return np.concatenate([p_WA, wxyz if wxyz[0] >= 0.0 else -wxyz]) + 0.0
 
 
-def is_apart(situation: Situation, conditions: InitialConditions) -> NDArray[np.bool_]:
+def is_apart(situation: Situation, conditions: Starts) -> NDArray[np.bool_]:
     """Tells which of n initial conditions are not those that failed, nor near them, shape (n,)."""
     apart = np.ones(len(conditions), dtype=bool)
-    for failed in situation.failed:
+    for failed in (reach.start for reach in situation.failed):
         same = np.linalg.norm(conditions.x0[:, :3] - failed.x0[:3], axis=1) < SAME_M
-        place = np.array([*failed.p_WR, failed.torso_m])
-        apart &= ~same | (np.linalg.norm(conditions.b0 - place, axis=1) >= RETRY_M)
+        apart &= ~same | (np.linalg.norm(conditions.b0 - failed.b0, axis=1) >= RETRY_M)
     return apart
 
 
 def _first_possible(
-    starts: PointingStarts, places: InitialConditions, values: Vector
+    starts: PointingStarts, places: Starts, values: Vector
 ) -> tuple[Vector, Vector] | None:
     """Returns tool pose and place, shape (7,) and (3,), of the best place where the arm can be."""
     for i in np.argsort(-values, kind="stable")[:MAX_TRIED]:

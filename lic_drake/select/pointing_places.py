@@ -4,8 +4,8 @@ from itertools import product
 
 import numpy as np
 
-from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.reach.pointing_starts import PointingStarts
+from lic_drake.reach.start import Starts
 from lic_drake.reach.task import Stand
 from lic_drake.types import Vector
 
@@ -16,7 +16,7 @@ _DECIMALS = 6
 """To the micrometre, as places are chosen: what is equal but for rounding is one place."""
 
 
-def make_lattice(starts: PointingStarts, x0: Vector) -> InitialConditions:
+def make_lattice(starts: PointingStarts, x0: Vector) -> Starts:
     """Returns places all over the stand for one tool pose, shape (7,).
 
     Among them are all from which the robot has this aperture where it had one when it learned: the
@@ -31,7 +31,7 @@ def make_lattice(starts: PointingStarts, x0: Vector) -> InitialConditions:
     return _standing(np.tile(x0, (len(places), 1)), places)
 
 
-def find_neighbours(stand: Stand, places: InitialConditions, step_m: float) -> InitialConditions:
+def find_neighbours(stand: Stand, places: Starts, step_m: float) -> Starts:
     """Returns the eight neighbours of each place, a step away along y, torso or both, each once."""
     steps = np.array(list(product((-step_m, 0.0, step_m), repeat=2)))
     steps = steps[np.any(steps != 0.0, axis=1)]
@@ -51,7 +51,6 @@ def _steps(low: float, high: float, more: Vector) -> Vector:
     return np.unique(np.round(np.append(row, inside), _DECIMALS))
 
 
-def _standing(x0: Vector, y_torso: Vector) -> InitialConditions:
+def _standing(x0: Vector, y_torso: Vector) -> Starts:
     """Returns tool poses, shape (n, 7), from y and height of the torso, shape (n, 2), metres."""
-    y_m, torso_m = y_torso.T
-    return InitialConditions(x0, np.column_stack([np.zeros(len(x0)), y_m]), torso_m)
+    return Starts(x0, np.column_stack([np.zeros(len(x0)), y_torso]))

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from lic_drake.errors import RequestError
 from lic_drake.experience.second_reach import SHOWN
-from lic_drake.reach.initial_conditions import InitialConditions
-from lic_drake.reach.request import IN_PLANE, ReachRecord
+from lic_drake.reach.request import ReachRecord
+from lic_drake.reach.start import IN_PLANE, POSE_AXES, Start
+from lic_drake.reach.start import Starts as StartBatch
 from lic_drake.reach.starts import ApertureStarts, LineStarts, Region, Starts
 from lic_drake.types import Vector
 
@@ -26,35 +27,27 @@ class FailedReach:
     """What a reach that failed showed (paper III-C), all in W.
 
     Attributes:
-        x0: Hand pose that it began with, shape (3,), or (7,) in space.
-        p_WR: Its base, shape (2,), metres.
+        start: Its start.
         shown: Values that an observation o may be made of, by the names of the records' columns,
             see `lic_drake.experience.second_reach.SHOWN`; the final ones are only there if it
             began at all.
-        torso_m: Height of its torso, metres.
     """
 
-    x0: Vector
-    p_WR: Vector
+    start: Start
     shown: Mapping[str, float]
-    torso_m: float = 0.0
 
     @classmethod
-    def from_start(cls, x0: Vector, p_WR: Vector | None = None, torso_m: float = 0.0) -> Self:
-        """Returns a failure of which nothing but its initial condition is known."""
-        axes = ("x", "y", "phi") if len(x0) == IN_PLANE else ("x", "y", "z", "qw", "qx", "qy", "qz")
-        shown = {f"start_{axis}": float(value) for axis, value in zip(axes, x0, strict=True)}
-        return cls(x0=x0, p_WR=np.zeros(2) if p_WR is None else p_WR, shown=shown, torso_m=torso_m)
+    def from_start(cls, start: Start) -> Self:
+        """Returns a failure of which nothing but its start is known."""
+        axes = POSE_AXES[len(start.x0)]
+        shown = {f"start_{axis}": float(x) for axis, x in zip(axes, start.x0, strict=True)}
+        return cls(start=start, shown=shown)
 
     @classmethod
     def from_record(cls, record: ReachRecord) -> Self:
         """Returns what a record says of a failed reach."""
-        return cls(
-            x0=record.x0,
-            p_WR=np.array([record.base_x, record.base_y]),
-            shown={name: getattr(record, name) for name in SHOWN},
-            torso_m=record.torso,
-        )
+        shown = {name: getattr(record, name) for name in SHOWN}
+        return cls(start=record.start, shown=shown)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,23 +76,22 @@ class Situation:
             RETRY_DISTANCES_M[-1],
         )
 
-    def allowed(self, conditions: InitialConditions) -> NDArray[np.bool_]:
+    def allowed(self, conditions: StartBatch) -> NDArray[np.bool_]:
         """Tells which of n initial conditions are far enough from all failed ones, shape (n,).
 
         None of them is one that failed.
         """
         return self._away(conditions, self.retry_distance_m)
 
-    def untried(self, conditions: InitialConditions) -> NDArray[np.bool_]:
+    def untried(self, conditions: StartBatch) -> NDArray[np.bool_]:
         """Tells which of n initial conditions have not failed themselves, shape (n,)."""
         return self._away(conditions, RETRY_DISTANCES_M[-1])
 
-    def _away(self, conditions: InitialConditions, distance_m: float) -> NDArray[np.bool_]:
+    def _away(self, conditions: StartBatch, distance_m: float) -> NDArray[np.bool_]:
         away = np.ones(len(conditions), dtype=bool)
-        for failed in self.failed:
+        for failed in (reach.start for reach in self.failed):
             same_pose = np.all(np.isclose(conditions.x0, failed.x0), axis=1)
-            b0 = [*failed.p_WR, failed.torso_m]
-            away &= ~(same_pose & np.all(np.isclose(conditions.b0, b0), axis=1))
+            away &= ~(same_pose & np.all(np.isclose(conditions.b0, failed.b0), axis=1))
             across = slice(1, 2 if len(failed.x0) == IN_PLANE else 3)
             apart = np.linalg.norm(conditions.x0[:, across] - failed.x0[across], axis=1)
             away &= apart > distance_m + 1e-9
@@ -123,7 +115,7 @@ class Situation:
             return regions
         margin = self.retry_distance_m + 1e-6
         for failed in self.failed:
-            y = failed.x0[1]
+            y = failed.start.x0[1]
             cut = []
             for region in regions:
                 cut += [_clip(region, upper=y - margin), _clip(region, lower=y + margin)]
@@ -136,22 +128,16 @@ class Selection:
     """A chosen initial condition.
 
     Attributes:
-        x0: Hand pose in W, (x, y, phi), or in space position and quaternion, metres and radians.
-        p_WR: Base, shape (2,), metres.
-        q: Joint angles that take it, shape (m,), radians.
+        start: Hand pose, base and torso, and the joint angles to begin with.
         probability: Estimated probability of success; None for strategies without an estimate.
         method: Name of the strategy.
         seconds: Wall time of the selection.
-        torso_m: Height of the torso, metres; 0 for a robot without one.
     """
 
-    x0: Vector
-    p_WR: Vector
-    q: Vector
+    start: Start
     probability: float | None
     method: str
     seconds: float
-    torso_m: float = 0.0
 
 
 def _clip(region: Region, lower: float = -np.inf, upper: float = np.inf) -> Region:

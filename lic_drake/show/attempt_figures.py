@@ -27,7 +27,7 @@ def snapshots_figure(attempts: Sequence[Attempt]) -> Figure:
     axes = figure.subplots(len(attempts), SNAPSHOTS, squeeze=False)
     for row, attempt in zip(axes, attempts, strict=True):
         request = attempt.request
-        scenario, p_WG = request.scenario, np.array(request.goal)
+        scenario, p_WG = request.scenario, request.goal
         instance = scenario.sample_instance(request.stream, request.environment)
         trace = simulate_request(request, keep_states=True).trace
         samples = np.linspace(0, len(trace.states) - 1, SNAPSHOTS).round().astype(int)
@@ -56,13 +56,12 @@ def densities_figure(
     for number, (ax, attempt) in enumerate(zip(axes, attempts, strict=True), start=1):
         failed = tuple(FailedReach.from_record(a.record) for a in attempts[: number - 1])
         situation = Situation(p_WG=p_WG, starts=starts, failed=failed)
-        chosen = attempt.selection
-        region = find_region(situation.planar_starts.regions, chosen.x0, chosen.p_WR)
+        start = attempt.selection.start
+        region = find_region(situation.planar_starts.regions, start.x0, start.b0[:2])
         assert region is not None  # Selections lie in one.
         conditions, shape = density_lattice(situation.planar_starts, region)
         probability = estimate_density(selector, situation, conditions)
-        x0 = chosen.x0 - [*chosen.p_WR, 0.0]
-        draw_density(ax, conditions.in_R, probability, shape, [(f"attempt {number}", x0)])
+        draw_density(ax, conditions.in_R, probability, shape, [(f"attempt {number}", start.x0_R)])
         model = 1 if selector.second is None else min(number, 2)
         ax.set_title(
             f"LIC-{model} ({selector.method}), goal ({p_WG[0]:.2f}, {p_WG[1]:.2f}) m", fontsize=10

@@ -17,9 +17,10 @@ from lic_drake.perception.cameras import make_renderer
 from lic_drake.perception.config import CamerasConfig
 from lic_drake.perception.observer import Observer
 from lic_drake.reach.pointing_starts import PointingStarts
-from lic_drake.reach.request import IN_PLANE, ReachRecord, ReachRequest, is_within_reach
+from lic_drake.reach.request import ReachRecord, ReachRequest, is_within_reach
 from lic_drake.reach.rollout import make_record, simulate_request
 from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.start import IN_PLANE
 from lic_drake.reach.starts import Starts, make_starts
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.select.lic import LicSelector
@@ -192,12 +193,11 @@ class _Talking:
 
 def _start(selection: Selection) -> str:
     """Returns an initial condition in words."""
-    base = f", base at y {selection.p_WR[1]:+.3f} m" if np.any(selection.p_WR) else ""
-    if len(selection.x0) == IN_PLANE:
-        phi = np.rad2deg(selection.x0[2])
-        return f"y {selection.x0[1]:+.3f} m, phi {phi:+.1f} degrees{base}"
-    aperture = f"the aperture at {_metres(selection.x0[:3])} m"
-    return f"{aperture}{base}, torso at {selection.torso_m:.3f} m"
+    x0, (x, y, torso) = selection.start.x0, selection.start.b0
+    base = f", base at y {y:+.3f} m" if x or y else ""
+    if len(x0) == IN_PLANE:
+        return f"y {x0[1]:+.3f} m, phi {np.rad2deg(x0[2]):+.1f} degrees{base}"
+    return f"the aperture at {_metres(x0[:3])} m{base}, torso at {torso:.3f} m"
 
 
 def _metres(position: Vector) -> str:
@@ -240,7 +240,7 @@ def _write_json(result: Demonstration, method: str, seed: int) -> None:
         "success": result.success,
         "attempts": [
             {
-                "start": attempt.selection.x0.tolist(),
+                "start": attempt.selection.start.x0.tolist(),
                 "estimated_success": attempt.selection.probability,
                 "selection_s": attempt.selection.seconds,
                 "record": asdict(attempt.record),

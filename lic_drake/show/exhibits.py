@@ -112,7 +112,7 @@ def _reachable_goals(scenario: Scenario, first: int) -> Iterator[tuple[int, Vect
     for environment in itertools.count(first):
         p_WG = scenario.sample_goal(STREAM, environment)
         starts = make_starts(scenario, scenario.sample_instance(STREAM, environment))
-        bases = np.unique(starts.grid.p_WR, axis=0)
+        bases = np.unique(starts.grid.b0[:, :2], axis=0)
         if any(is_within_reach(scenario, p_WG - [*base, 0.0]) for base in bases):
             yield environment, p_WG
 

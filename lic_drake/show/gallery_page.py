@@ -99,9 +99,9 @@ def numbers_of(number: int, attempt: Attempt) -> dict[str, float | int | str | N
     """
     chosen, record = attempt.selection, attempt.record
     values = {
-        "start_y_m": float(chosen.x0[1]),
-        "start_phi_deg": float(np.rad2deg(chosen.x0[2])),
-        "base_y_m": float(chosen.p_WR[1]),
+        "start_y_m": float(chosen.start.x0[1]),
+        "start_phi_deg": float(np.rad2deg(chosen.start.x0[2])),
+        "base_y_m": float(chosen.start.b0[1]),
         "estimated_success": chosen.probability,
         "outcome": record.outcome,
         "duration_s": record.duration_s,

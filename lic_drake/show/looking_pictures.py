@@ -50,7 +50,7 @@ class LookingPictures(AperturePictures):
     def add(self, request: ReachRequest, record: ReachRecord, trace: ReachTrace) -> None:
         """Records base, torso and arm moving to the start, and the reach; films it."""
         super().add(request, record, trace)
-        b0 = np.array([*request.base, request.torso])
+        b0 = request.start.b0
         step = max(1, round(self._observer.scenario.mpc.rate_hz / FRAMES_PER_SECOND))
         self._frames += [self._film.frame(b0, state) for state in trace.states[::step]]
 
@@ -93,7 +93,7 @@ class LookingPictures(AperturePictures):
         failed = tuple(FailedReach.from_record(a.record) for a in done[:k])
         situation = Situation(p_WG=belief.p_WG, starts=belief.starts, failed=failed)
         values = estimate_apertures(selector.objective(situation), belief.starts)
-        x0 = done[k].selection.x0
+        x0 = done[k].selection.start.x0
         apart = np.linalg.norm(belief.starts.p_WA - x0[:3], axis=1)
         draw_passable_probability(
             ax,

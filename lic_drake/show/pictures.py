@@ -108,7 +108,7 @@ class AperturePictures:
         """Records base, torso and arm moving to the start, and the reach."""
         if self._traces:
             self._recording.retract(self._traces[-1])
-        b0 = np.array([*request.base, request.torso])
+        b0 = request.start.b0
         if trace.q:
             self._recording.move_to(b0, trace.q[0])
         self._recording.add_reach(trace, self._p_WG, b0)
@@ -141,7 +141,7 @@ class AperturePictures:
                 starts.all_apertures,
                 starts.aperture_m,
                 self._p_WG,
-                [(f"attempt {number}", attempt.selection.x0[:3])],
+                [(f"attempt {number}", attempt.selection.start.x0[:3])],
             )
             model = 1 if selector.second is None else min(number, 2)
             ax.set_title(f"LIC-{model} ({selector.method}): {attempt.record.outcome}", fontsize=10)

@@ -79,7 +79,7 @@ def save_stills(
     for number, (attempt, trace) in enumerate(zip(done, traces, strict=True), start=1):
         if not trace.states:
             continue
-        b0 = np.array([*attempt.request.base, attempt.request.torso])
+        b0 = attempt.request.start.b0
         last = len(trace.states) - 1
         hardest = int(np.argmax(trace.total_force)) if any(trace.contacts) else last // 2
         moments = {"start": 0, "middle": hardest, "end": last}

@@ -15,7 +15,7 @@ from pathlib import Path
 from lic_drake.evaluate.batch import simulate_requests
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.pointing_starts import pointing_starts
-from lic_drake.reach.request import make_request
+from lic_drake.reach.request import ReachRequest
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.starts import make_starts
 
@@ -42,8 +42,7 @@ def main() -> int:
             at = 0 if args.common_goals else environment
             p_WG = scenario.sample_goal(args.stream, at, goal)
             requests += [
-                make_request(scenario, args.stream, environment, p_WG, x0, p_WR, torso_m)
-                for x0, p_WR, torso_m in zip(grid.x0, grid.p_WR, grid.torso_m, strict=True)
+                ReachRequest(scenario, args.stream, environment, p_WG, start) for start in grid
             ]
     library = ExperienceLibrary(args.out / args.scenario / "factorial")
     library.create()

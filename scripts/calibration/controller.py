@@ -19,8 +19,9 @@ import numpy as np
 from lic_drake.evaluate.batch import simulate_requests
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.intervals import wilson_interval
-from lic_drake.reach.request import ReachRequest, make_request
+from lic_drake.reach.request import ReachRequest
 from lic_drake.reach.scenario import Scenario, load_scenario
+from lic_drake.reach.start import Start
 
 PUBLISHED = {20: 77.3, 80: 28.3}
 START_Q_DEG = (-50.0, 70.0, 145.0)
@@ -37,7 +38,7 @@ def field_requests(scenario: Scenario, fields: int) -> list[ReachRequest]:
     """Returns the reaches of all fields."""
     x0 = scenario.arm().tip_pose(np.deg2rad(START_Q_DEG))
     return [
-        make_request(scenario, "calibration", field, p_WG, x0)
+        ReachRequest(scenario, "calibration", field, p_WG, Start(x0))
         for field in range(fields)
         for p_WG in goals()
     ]

@@ -20,7 +20,7 @@ from lic_drake.evaluate.statistics import mcnemar
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.intervals import wilson_interval
 from lic_drake.reach.pointing_starts import pointing_starts
-from lic_drake.reach.request import ReachRecord, ReachRequest, make_request
+from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.scenario import Scenario, load_scenario
 from lic_drake.seeds import make_generator
 
@@ -59,9 +59,7 @@ def near_requests(scenario: Scenario, count: int) -> list[ReachRequest]:
         apart = np.linalg.norm(starts.x0[:, 1:3] - p_WG[1:], axis=1)
         rng = make_generator("calibration", "near start", environment)
         i = int(rng.choice(np.argsort(apart)[:NEAR_STARTS]))
-        requests.append(
-            make_request(scenario, "calibration", environment, p_WG, starts.x0[i], starts.p_WR[i])
-        )
+        requests.append(ReachRequest(scenario, "calibration", environment, p_WG, starts[i]))
     return requests
 
 

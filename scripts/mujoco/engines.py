@@ -3,8 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.reach.environment import Environment, simulate
 from lic_drake.reach.request import ReachRequest
@@ -44,12 +42,12 @@ class Engine:
             return lambda request: simulate(
                 simulation,
                 scenario,
-                arm.solve_ik(np.array(request.start)),
-                np.array(request.goal),
+                arm.solve_ik(request.start.x0),
+                request.goal,
             )
         if self.time_step_s is not None:
             scenario = replace(
                 scenario, scene=replace(scenario.scene, time_step_s=self.time_step_s)
             )
         environment = Environment(scenario, instance, sleep=self.sleep)
-        return lambda request: environment.reach(np.array(request.goal), np.array(request.start))
+        return lambda request: environment.reach(request.goal, request.start.x0)

@@ -7,7 +7,7 @@ import numpy as np
 from lic_drake.evaluate.batch import simulate_requests
 from lic_drake.experience.added import added_columns
 from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.reach.request import ReachRequest, make_request
+from lic_drake.reach.request import ReachRequest
 from lic_drake.reach.starts import make_starts
 from lic_drake.select.registry import make_selector
 from lic_drake.select.situation import Situation
@@ -50,11 +50,7 @@ def collect_second_attempts(
         starts = make_starts(scenario, scenario.sample_instance("training", environment))
         for p_WG in scenario.goals("training", environment):
             chosen = selector.select(Situation(p_WG=p_WG, starts=starts))
-            firsts.append(
-                make_request(
-                    scenario, "training", environment, p_WG, chosen.x0, chosen.p_WR, chosen.torso_m
-                )
-            )
+            firsts.append(ReachRequest(scenario, "training", environment, p_WG, chosen.start))
     output.create()
     say(f"{len(firsts)} first attempts chosen")
     records = simulate_requests(firsts, output, scenario, workers, say)
@@ -65,9 +61,6 @@ def collect_second_attempts(
             continue
         instance = scenario.sample_instance("training", first.environment)
         grid = make_starts(scenario, instance).grid
-        seconds += [
-            first.then(x0, p_WR, torso_m)
-            for x0, p_WR, torso_m in zip(grid.x0, grid.p_WR, grid.torso_m, strict=True)
-        ]
+        seconds += [first.then(start) for start in grid]
     simulate_requests(seconds, output, scenario, workers, say)
     return len(seconds)

@@ -21,9 +21,9 @@ from lic_drake.experience.schema import scenario_text
 from lic_drake.experience.second_reach import pair_reaches
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
-from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.reach.pointing_starts import PointingStarts, pointing_starts
 from lic_drake.reach.scenario import parse_scenario
+from lic_drake.reach.start import Starts
 from lic_drake.robots.pr2 import Pr2Arm
 from lic_drake.robots.pr2_inverse import ROBOT_TO_CLUTTER, solve_pointing
 from lic_drake.seeds import make_generator
@@ -51,9 +51,7 @@ Key = tuple[str, int, str]
 """Estimator, attempt, optimiser."""
 
 
-def sample_conditions(
-    starts: PointingStarts, count: int, rng: np.random.Generator
-) -> InitialConditions:
+def sample_conditions(starts: PointingStarts, count: int, rng: np.random.Generator) -> Starts:
     """Returns what is within reach among random apertures, bases, torsos and pan angles.
 
     The last stand for configurations: each leaves at most two. Whether the arm touches anything is
@@ -73,27 +71,28 @@ def sample_conditions(
     pose = np.array([arm.tip_pose(row) for row in q]).reshape(-1, 7)
     pose[:, :3] = p_WA[sample]
     p_WR = np.column_stack([np.zeros(count), y_m])[sample]
-    return InitialConditions(pose, p_WR, torso_m[sample])
+    return Starts(pose, np.column_stack([p_WR, torso_m[sample]]))
 
 
-def best_possible(starts: PointingStarts, samples: InitialConditions, values: Vector) -> float:
+def best_possible(starts: PointingStarts, samples: Starts, values: Vector) -> float:
     """Returns the highest of the samples' values, shape (n,), that is possible, or -inf.
 
     From the best on, as the check costs more than the estimate.
     """
     for k in np.argsort(-values):
-        if starts.angles(samples.x0[k], samples.p_WR[k], samples.torso_m[k]) is not None:
+        if starts.angles(samples.x0[k], samples.b0[k, :2], samples.b0[k, 2]) is not None:
             return float(values[k])
     return -np.inf
 
 
 def is_possible(starts: PointingStarts, chosen: Selection) -> bool:
     """Tells whether a selection is, by its own joint angles and by a search for others."""
-    arm = starts.scenario.arm(chosen.torso_m)
-    tool = arm.tip_pose(chosen.q)[:3] + [*chosen.p_WR, 0.0]
-    touches = starts.checker.touches(np.r_[chosen.p_WR, 0.0, chosen.torso_m, chosen.q])
-    again = starts.angles(chosen.x0, chosen.p_WR, chosen.torso_m)
-    return bool(np.allclose(tool, chosen.x0[:3], atol=1e-6)) and not touches and again is not None
+    x0, b0, q = chosen.start.x0, chosen.start.b0, chosen.start.q
+    assert q is not None
+    tool = starts.scenario.arm(b0[2]).tip_pose(q)[:3] + [*b0[:2], 0.0]
+    touches = starts.checker.touches(np.r_[b0[:2], 0.0, b0[2], q])
+    again = starts.angles(x0, b0[:2], b0[2])
+    return bool(np.allclose(tool, x0[:3], atol=1e-6)) and not touches and again is not None
 
 
 def check_situation(
@@ -133,9 +132,7 @@ def check_situation(
                     if is_possible(starts, chosen):
                         value = _value(objective, chosen)
                     if kind == "MathematicalProgram":
-                        next_failed = (
-                            FailedReach.from_start(chosen.x0, chosen.p_WR, chosen.torso_m),
-                        )
+                        next_failed = (FailedReach.from_start(chosen.start),)
                 found[name, attempt, kind] = Outcome(
                     best, of_grid, value, starts_s, candidates_s, optimisation_s
                 )
@@ -146,7 +143,7 @@ def check_situation(
 
 
 def _value(objective: SuccessObjective, chosen: Selection) -> float:
-    condition = InitialConditions(chosen.x0[None], chosen.p_WR[None], np.array([chosen.torso_m]))
+    condition = Starts.of(chosen.start)
     return float(objective.values(condition)[0])
 
 

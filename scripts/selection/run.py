@@ -16,7 +16,7 @@ import numpy as np
 from lic_drake.estimate.categories import features_of
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
-from lic_drake.reach.initial_conditions import InitialConditions
+from lic_drake.reach.start import Starts
 from lic_drake.reach.starts import planar_starts
 from lic_drake.robots.planar import PlanarArm
 from lic_drake.select.objective import Objective
@@ -44,7 +44,7 @@ def main() -> int:
         parser.error(f"{args.library} is of another robot than the planar arm")
     starts = planar_starts(scenario, scenario.sample_instance("holdout", 0))
     poses = starts.poses.scan(*SCAN)
-    scan = InitialConditions(poses, np.zeros((len(poses), 2)))
+    scan = Starts(poses, np.zeros((len(poses), 3)))
     columns = library.columns()
     goals = [scenario.sample_goal("holdout", i) for i in range(args.situations)]
     lines = [
@@ -61,7 +61,7 @@ def main() -> int:
             no_worse, within, shortfall, seconds = [], [], [], []
             for objective, best in zip(objectives, scans, strict=True):
                 chosen = selector.select(Situation(p_WG=objective.p_WG, starts=starts))
-                value, _, _ = objective.value_and_gradient(chosen.x0, np.zeros(3))
+                value, _, _ = objective.value_and_gradient(chosen.start.x0, np.zeros(3))
                 grid = float(objective.values(starts.grid).max())
                 no_worse.append(value >= grid - 1e-9)
                 within.append(np.clip(value, 0.0, 1.0) >= 0.99 * best)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lic_drake.errors import RequestError
-from lic_drake.reach.initial_conditions import InitialConditions
+from lic_drake.reach.start import Starts
 from lic_drake.robots.planar import PlanarArm
 from lic_drake.select.objective import SuccessObjective
 from lic_drake.select.planar_lic import PlanarLic
@@ -67,7 +67,7 @@ class MixtureObjective:
         """Failures that all categories observe."""
         return self.parts[0].failed if all(part.failed for part in self.parts) else ()
 
-    def values(self, conditions: InitialConditions) -> Vector:
+    def values(self, conditions: Starts) -> Vector:
         """Returns the estimates at n initial conditions, shape (n,); see `SuccessObjective`."""
         values: Vector = self.weight @ [part.values(conditions) for part in self.parts]
         return values
@@ -165,11 +165,11 @@ def log_likelihood(category: Category, before: Situation, failed: FailedReach) -
         before: What was known before the reach.
         failed: The reach.
     """
-    start = InitialConditions(failed.x0[None], failed.p_WR[None])
+    start = Starts.of(failed.start)
     success = float(category.lic.objective(before).values(start)[0])
     result = np.log(np.clip(1.0 - success, LEAST_PROBABILITY, 1.0 - LEAST_PROBABILITY))
     p_WE = np.array([failed.shown.get(f"final_{axis}", np.nan) for axis in "xy"])
     if category.final is not None and np.all(np.isfinite(p_WE)):
         z = category.lic.first.features.join(before.p_WG - start.b0[0], start.in_R[0])
-        result += category.final.log_density(z, (p_WE - failed.p_WR)[None])[0]
+        result += category.final.log_density(z, (p_WE - failed.start.b0[:2])[None])[0]
     return float(result)

@@ -28,7 +28,7 @@ def library(tmp_path: Path) -> str:
     library = ExperienceLibrary(tmp_path / "library")
     for environment in request.environment_indices:
         records = [
-            replace(make_record(item), success=item.start[1] > item.base[1])
+            replace(make_record(item), success=item.start.x0[1] > item.start.b0[1])
             for item in request.reaches(environment)
         ]
         library.write_shard(f"training-{environment:06d}", records, scenario)

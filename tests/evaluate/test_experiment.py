@@ -13,7 +13,7 @@ from lic_drake.evaluate import experiment as dut
 from lic_drake.evaluate.experiment import Evaluation, run_evaluation
 from lic_drake.evaluate.trials import TrialRow, read_trials
 from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.reach.request import ReachRecord, ReachRequest, request_of
+from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.scenario import load_scenario
 
 EASY = "{clutter: {num_movable: 2, num_fixed: 2}, stop: {timeout_s: 0.2}}"
@@ -28,7 +28,8 @@ def make_library(
     request = make_request(scenario=scenario, max_goals=6, max_starts=9)
     for environment in range(3):
         records = [
-            replace(make_record(r), success=r.start[1] > 0.0) for r in request.reaches(environment)
+            replace(make_record(r), success=r.start.x0[1] > 0.0)
+            for r in request.reaches(environment)
         ]
         library.write_shard(f"training-{environment}", records, scenario)
     return library
@@ -137,7 +138,7 @@ def test_rows_agree_with_the_library_of_reaches(tmp_path: Path, calls: list[str]
         assert not any(row.success for row in trial[:-1])
         assert trial[-1].success or len(trial) == 3
         # Each found the environment as those before it left it.
-        chain = [request_of(records[row.key], scenario) for row in trial]
+        chain = [ReachRequest.from_record(records[row.key], scenario) for row in trial]
         for number, request in enumerate(chain):
             assert len(request.after) == number
             assert request.before() == (chain[number - 1] if number else None)
@@ -260,7 +261,7 @@ def test_apertures_are_evaluated_with_bases(tmp_path: Path, calls: list[str]) ->
     for record in asked.reaches.records():
         p_WA = scenario.sample_instance("evaluation", record.environment).p_WA
         assert p_WA is not None
-        assert np.linalg.norm(p_WA[:, :2] - record.x0[:2], axis=1).min() < 1e-9
+        assert np.linalg.norm(p_WA[:, :2] - record.start.x0[:2], axis=1).min() < 1e-9
     assert {row.method for row in rows} == {"rnd", "cost", "gp"}
 
 

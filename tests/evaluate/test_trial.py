@@ -55,9 +55,9 @@ def test_a_reach_is_the_selections_in_the_environment_with_the_goal(scenario: Sc
     for attempt in run_trial(scenario, selector, "evaluation", 5, GOAL, 3, reach=failing):
         request, chosen = attempt.request, attempt.selection
         assert (request.stream, request.environment) == ("evaluation", 5)
-        assert request.goal == tuple(GOAL)
-        assert request.start == tuple(chosen.x0)
-        assert request.base == tuple(chosen.p_WR)
+        np.testing.assert_array_equal(request.goal, GOAL)
+        np.testing.assert_array_equal(request.start.x0, chosen.start.x0)
+        np.testing.assert_array_equal(request.start.b0, chosen.start.b0)
         assert attempt.record.key == request.key
         assert chosen.method == "rnd"
     # The apertures are those of the environment.
@@ -87,7 +87,7 @@ def test_a_strategy_knows_what_the_failed_attempts_showed(scenario: Scenario) ->
     done = run_trial(scenario, selector, "evaluation", 5, GOAL, 3, reach=failing)
     assert [len(situation.failed) for situation in selector.situations] == [0, 1, 2]
     for failed, attempt in zip(selector.situations[-1].failed, done[:2], strict=True):
-        np.testing.assert_array_equal(failed.x0, attempt.selection.x0)
-        np.testing.assert_array_equal(failed.p_WR, attempt.selection.p_WR)
+        np.testing.assert_array_equal(failed.start.x0, attempt.selection.start.x0)
+        np.testing.assert_array_equal(failed.start.b0, attempt.selection.start.b0)
         np.testing.assert_array_equal(failed.shown["final_x"], attempt.record.final_x)
         np.testing.assert_array_equal(failed.shown["final_vy"], attempt.record.final_vy)

@@ -29,7 +29,7 @@ def test_the_papers_library_of_passages_has_1680_different_reaches() -> None:
     reaches = [item for environment in range(120) for item in request.reaches(environment)]
     assert len({item.key for item in reaches}) == len(reaches) == 1680
     # Each environment has a goal of its own, the one that trials there ask for.
-    goals = {(item.environment, item.goal) for item in reaches}
+    goals = {(item.environment, *item.goal) for item in reaches}
     assert len({goal for _, goal in goals}) == len(goals) == 120
     for environment, goal in goals:
         assert goal == tuple(scenario.sample_goal("training", environment).tolist())
@@ -43,13 +43,13 @@ def test_the_papers_library_of_apertures_has_7200_different_reaches() -> None:
     reaches = [item for environment in range(0, 480, 40) for item in request.reaches(environment)]
     assert len({item.key for item in reaches}) == len(reaches) == 12 * 15
     # The same hand in the same aperture, but each time another direction and base.
-    assert len({item.base for item in reaches}) == len(reaches)
+    assert len({tuple(item.start.b0) for item in reaches}) == len(reaches)
     for environment in (0, 40):
         apertures = scenario.sample_instance("training", environment).p_WA
         assert apertures is not None
-        assert {item.start[:2] for item in reaches if item.environment == environment} == set(
-            map(tuple, apertures[:, :2].tolist())
-        )
+        assert {
+            tuple(item.start.x0[:2]) for item in reaches if item.environment == environment
+        } == set(map(tuple, apertures[:, :2].tolist()))
 
 
 def test_starts_and_bases_belong_together_when_thinned() -> None:
@@ -58,15 +58,15 @@ def test_starts_and_bases_belong_together_when_thinned() -> None:
     some = CollectionRequest(scenario=scenario, max_starts=4).starts(2)
     rows = [np.flatnonzero((whole.x0 == x0).all(axis=1))[0] for x0 in some.x0]
     assert len(rows) == 4
-    np.testing.assert_array_equal(some.p_WR, whole.p_WR[rows])
+    np.testing.assert_array_equal(some.b0, whole.b0[rows])
 
 
 def test_every_goal_is_tried_from_every_start() -> None:
     request = make_request(first_environment=5, stream="holdout")
     reaches = request.reaches(6)
-    pairs = {(item.goal, item.start) for item in reaches}
+    pairs = {(tuple(item.goal), item.start) for item in reaches}
     assert len(reaches) == len(pairs) == 4 * 3
-    assert {item.goal for item in reaches} == set(map(tuple, request.goals().tolist()))
+    assert {tuple(item.goal) for item in reaches} == set(map(tuple, request.goals().tolist()))
     assert {(item.stream, item.environment) for item in reaches} == {("holdout", 6)}
     assert list(request.environment_indices) == [5, 6, 7]
 

@@ -14,14 +14,16 @@ from support.reaches import assert_never_began, reach_request, small_clutter
 from lic_drake.experience.schema import make_header, read_table, to_records, to_table, write_table
 from lic_drake.reach import rollout as dut
 from lic_drake.reach.environment import Environment
-from lic_drake.reach.request import ReachRecord, ReachRequest, request_of
+from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.rollout import run_reach
+from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.start import Start
 
 SCENARIO = small_clutter(2.5)
 FIRST = reach_request(SCENARIO, (0.7, 0.0), 0.0, 90.0, environment=2)
 # The same start again; and one elsewhere, of another base.
-SECOND = FIRST.then(np.array(FIRST.start), np.zeros(2))
-THIRD = SECOND.then(np.array([0.335, 0.1, np.deg2rad(60.0)]), np.array([0.0, 0.1]))
+SECOND = FIRST.then(FIRST.start)
+THIRD = SECOND.then(Start(np.array([0.335, 0.1, np.deg2rad(60.0)]), np.array([0.0, 0.1, 0.0])))
 
 
 @pytest.fixture(autouse=True)
@@ -29,6 +31,12 @@ def fresh_process() -> Iterator[None]:
     forget()
     yield
     forget()
+
+
+def from_base(y_m: float, scenario: Scenario) -> ReachRequest:
+    """The first reach in another scenario, the base elsewhere."""
+    start = Start(FIRST.start.x0, np.array([0.0, y_m, 0.0]))
+    return replace(FIRST, scenario=scenario, start=start)
 
 
 def forget() -> None:
@@ -53,9 +61,9 @@ def by_hand(requests: list[ReachRequest]) -> list[ReachRecord]:
     drawn = SCENARIO.sample_instance(FIRST.stream, FIRST.environment)
     instance, records = drawn, []
     for request in requests:
-        base = np.array([*request.base, 0.0])
+        base = request.start.b0
         environment = Environment(SCENARIO, instance, p_WR=base)
-        result = environment.reach(np.array(request.goal), np.array(request.start))
+        result = environment.reach(request.goal, request.start.x0)
         assert result.trace.p_WO is not None
         instance = drawn.with_objects_at(result.trace.p_WO)
         records.append(dut.make_record(request, result, 0.0))
@@ -78,7 +86,7 @@ def test_each_reach_of_a_chain_finds_the_objects_where_the_one_before_left_them(
 
 
 def test_a_second_reach_differs_from_one_that_finds_the_environment_as_drawn() -> None:
-    assert (SECOND.start, SECOND.base, SECOND.goal) == (FIRST.start, FIRST.base, FIRST.goal)
+    assert SECOND.start == FIRST.start
     first, second = alone(FIRST), alone(SECOND)
     assert measured(first) != measured(second)
     third, fresh = alone(THIRD), alone(replace(THIRD, after=()))
@@ -118,7 +126,7 @@ def test_many_bases_and_histories_of_an_environment_do_not_mix(
     monkeypatch.setattr(dut, "MAX_ENDS", 1)
     shorter = small_clutter(0.4)
     chain = [replace(request, scenario=shorter) for request in (FIRST, SECOND, THIRD)]
-    chain += [replace(FIRST, scenario=shorter, base=(0.0, 0.02 * k)) for k in range(4)]
+    chain += [from_base(0.02 * k, shorter) for k in range(4)]
     expected = [alone(request) for request in chain]
     forget()
     again = [run_reach(request) for request in [*chain, *reversed(chain)]]
@@ -130,9 +138,9 @@ def test_many_bases_and_histories_of_an_environment_do_not_mix(
 def test_only_a_few_environments_are_kept() -> None:
     shorter = small_clutter(0.04)
     for k in range(12):
-        run_reach(replace(FIRST, scenario=shorter, base=(0.0, 0.01 * k)))
+        run_reach(from_base(0.01 * k, shorter))
         assert 1 <= len(dut._environments) <= dut.MAX_ENVIRONMENTS
-    kept = dut.environment_of(replace(FIRST, scenario=shorter, base=(0.0, 0.01 * 11)))
+    kept = dut.environment_of(from_base(0.01 * 11, shorter))
     assert kept in dut._environments.values()
     run_reach(replace(FIRST, scenario=shorter, environment=1))
     assert len(dut._environments) == 1
@@ -143,7 +151,7 @@ def test_a_reach_that_never_began_leaves_everything_in_its_place(phi_deg: float)
     goal = (0.7, 0.0) if phi_deg < 0 else (5.0, 0.0)
     nothing = reach_request(SCENARIO, goal, phi_deg=phi_deg, environment=2)
     assert_never_began(alone(nothing), "invalid_start" if phi_deg < 0 else "unreachable")
-    after = nothing.then(np.array(FIRST.start), np.zeros(2))
+    after = nothing.then(FIRST.start)
     assert measured(alone(after)) == measured(alone(replace(after, after=())))
 
 
@@ -155,7 +163,7 @@ def test_a_request_knows_the_ones_before_it() -> None:
     assert SECOND.before() == FIRST
     assert THIRD.before() == SECOND
     assert [len(request.after) for request in (FIRST, SECOND, THIRD)] == [0, 1, 2]
-    assert (THIRD.base, THIRD.after[1].start) == ((0.0, 0.1), SECOND.start)
+    assert (THIRD.start.b0[1], THIRD.after[1]) == (0.1, SECOND.start)
 
 
 @pytest.mark.parametrize("request_", [FIRST, SECOND, THIRD], ids=["first", "second", "third"])
@@ -163,10 +171,10 @@ def test_a_record_leads_back_to_its_request(request_: ReachRequest, tmp_path: Pa
     shorter = replace(request_, scenario=small_clutter(0.2))
     record = alone(shorter)
     assert len(record.after) == 5 * len(request_.after)
-    assert request_of(record, shorter.scenario) == shorter
-    assert request_of(record, shorter.scenario).key == record.key
+    assert ReachRequest.from_record(record, shorter.scenario) == shorter
+    assert ReachRequest.from_record(record, shorter.scenario).key == record.key
     # Also from a file.
     path = tmp_path / "reaches.parquet"
     write_table(to_table([record], make_header(shorter.scenario)), path)
     (row,) = to_records(read_table(path))
-    assert request_of(row, shorter.scenario) == shorter
+    assert ReachRequest.from_record(row, shorter.scenario) == shorter

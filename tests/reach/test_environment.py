@@ -7,11 +7,13 @@ from support.worlds import box, cylinder, make_clutter
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.reach.environment import Environment
+from lic_drake.reach.request import ReachRequest
 from lic_drake.reach.rollout import make_record
 from lic_drake.reach.scenario import Scenario, load_scenario
+from lic_drake.reach.start import Start
 from lic_drake.reach.trace import ReachResult
 
-X0 = np.array(reach_request(free_space()).start)
+X0 = reach_request(free_space()).start.x0
 P_WG = np.array([0.6, 0.1, 0.0])
 
 
@@ -115,16 +117,16 @@ def test_a_record_gives_positions_in_the_world_and_the_base() -> None:
     base = (0.0, -0.25)
     scenario = small_clutter(1.0)
     request = reach_request(scenario, (0.65, -0.3), y_m=-0.2, phi_deg=60.0)
-    request = replace(request, base=base)
+    request = replace(request, start=Start(request.start.x0, np.array([*base, 0.0])))
     instance = scenario.sample_instance(request.stream, request.environment)
     environment = Environment(scenario, instance, p_WR=np.array([*base, 0.0]))
-    result = environment.reach(np.array(request.goal), np.array(request.start))
+    result = environment.reach(request.goal, request.start.x0)
     record = make_record(request, result, 0.0)
     assert (record.base_x, record.base_y, record.after) == (*base, ())
-    assert (tuple(record.p_WG), tuple(record.x0)) == (request.goal, request.start)
+    assert ReachRequest.from_record(record, scenario) == request
     arm = scenario.arm()
     np.testing.assert_allclose(
-        arm.tip_pose(np.array(record.q_start)) + [*base, 0.0], record.x0, atol=1e-12
+        arm.tip_pose(np.array(record.q_start)) + [*base, 0.0], record.start.x0, atol=1e-12
     )
     final = np.array([record.final_x, record.final_y, record.final_phi])
     np.testing.assert_allclose(

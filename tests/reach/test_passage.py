@@ -12,9 +12,10 @@ from lic_drake.errors import RequestError
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 from lic_drake.reach.environment import Environment
-from lic_drake.reach.request import is_within_reach, make_request
+from lic_drake.reach.request import ReachRequest, is_within_reach
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario, load_scenario, parse_scenario, to_dict
+from lic_drake.reach.start import Start
 
 SCENARIO = load_scenario("passage-clutter")
 STARTS = SCENARIO.task.start_line.grid(ARM)
@@ -118,7 +119,7 @@ def test_a_reach_into_a_passage_is_recorded_and_depends_on_its_request_only() ->
     # Where the axis of the passage comes nearest to the start line the way in is straight.
     outcomes = set()
     for x0 in STARTS[[2, 7, 9]]:
-        request = make_request(SCENARIO, "training", 0, instance.p_WG, x0)
+        request = ReachRequest(SCENARIO, "training", 0, instance.p_WG, Start(x0))
         record = run_reach(request)
         outcomes.add(record.outcome)
         assert record.category == "passage-clutter"

@@ -16,10 +16,11 @@ from lic_drake.reach import rollout
 from lic_drake.reach.diagram import make_reach_diagram
 from lic_drake.reach.environment import Environment, simulate
 from lic_drake.reach.pointing_starts import pointing_starts, standing_at
-from lic_drake.reach.request import make_request, request_of
+from lic_drake.reach.request import ReachRequest
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.simulation import Simulation
+from lic_drake.reach.start import Start
 from lic_drake.reach.trace import ReachResult
 from lic_drake.show.recording import ReachRecording
 
@@ -96,20 +97,20 @@ def test_a_reach_into_forty_spheres_gives_the_same_record_again() -> None:
     # Base and tool 1 cm nearer to the spheres than starts are: a request may be of any base.
     p_WR, x0 = np.array([0.01, 0.02]), start.grid.x0[8] + np.eye(7)[0] * 0.01
     p_WG = BRIEF.goals("training", 1)[6]
-    request = make_request(BRIEF, "training", 1, p_WG, x0, p_WR, 0.16)
+    request = ReachRequest(BRIEF, "training", 1, p_WG, Start(x0, np.array([*p_WR, 0.16])))
     record = run_reach(request)
     assert record.outcome == "timeout"
     assert record.robot == "pr2"
     assert (record.base_x, record.base_y, record.torso) == (0.01, 0.02, 0.16)
     assert record.in_space
-    np.testing.assert_array_equal(record.x0, x0)
+    np.testing.assert_array_equal(record.start.x0, x0)
     np.testing.assert_allclose(record.q_start, start.grid_angles[8], atol=1e-6)
     final = pr2_of(BRIEF).raised(0.16).tip_pose(np.array(record.q_final)) + np.pad(p_WR, (0, 5))
     names = ("x", "y", "z", "qw", "qx", "qy", "qz")
     np.testing.assert_allclose([getattr(record, f"final_{n}") for n in names], final, atol=1e-12)
     assert record.min_distance < np.linalg.norm(p_WG - x0[:3])
-    assert request_of(record, BRIEF) == request
-    assert request_of(record, BRIEF).key == record.key
+    assert ReachRequest.from_record(record, BRIEF) == request
+    assert ReachRequest.from_record(record, BRIEF).key == record.key
     rollout._environments.clear()
     assert comparable([run_reach(request)]) == comparable([record])
     lone = run_reach(request, sleep=False)
@@ -120,7 +121,7 @@ def test_a_reach_into_forty_spheres_gives_the_same_record_again() -> None:
 def test_a_start_of_the_wrong_kind_is_refused() -> None:
     p_WG = BRIEF.goals("training", 1)[6]
     with pytest.raises(RequestError, match=r"a start of pr2 has 7 numbers \(x, y, z, qw"):
-        make_request(BRIEF, "training", 1, p_WG, np.zeros(3))
+        ReachRequest(BRIEF, "training", 1, p_WG, Start(np.zeros(3)))
 
 
 def test_a_collection_holds_every_goal_from_every_start() -> None:
@@ -131,10 +132,9 @@ def test_a_collection_holds_every_goal_from_every_start() -> None:
         )
         requests = collection.reaches(environment)
         assert len({request.key for request in requests}) == len(requests) == 12 * count
-        assert {request.base for request in requests} == {(0.0, y_m)}
-        assert {request.torso for request in requests} == {torso_m}
-        assert len({request.goal for request in requests}) == 12
-        assert len({request.start[:3] for request in requests}) == count
+        assert {tuple(request.start.b0) for request in requests} == {(0.0, y_m, torso_m)}
+        assert len({tuple(request.goal) for request in requests}) == 12
+        assert len({tuple(request.start.x0[:3]) for request in requests}) == count
 
 
 def test_a_collections_reaches_are_counted_where_starts_differ_from_place_to_place() -> None:
@@ -164,11 +164,11 @@ def test_a_recording_shows_the_robot(tmp_path: Path) -> None:
 def test_a_further_reach_finds_the_spheres_where_the_first_left_them() -> None:
     p_WG = BRIEF.goals("training", 2)[4]
     starts = pointing_starts(BRIEF, BRIEF.sample_instance("training", 2)).grid
-    first = make_request(BRIEF, "training", 2, p_WG, starts.x0[7])
-    second = first.then(starts.x0[8], np.zeros(2), torso_m=0.16)
-    assert (second.torso, second.after[0].torso) == (0.16, 0.15)
+    first = ReachRequest(BRIEF, "training", 2, p_WG, starts[7])
+    second = first.then(Start(starts.x0[8], np.array([0.0, 0.0, 0.16])))
+    assert (second.start.b0[2], second.after[0].b0[2]) == (0.16, 0.15)
     record = run_reach(second)
     assert len(record.after) == 7 + 2 + 1
-    assert request_of(record, BRIEF) == second
+    assert ReachRequest.from_record(record, BRIEF) == second
     assert second.before() == first
-    assert second.key != first.then(starts.x0[8], np.zeros(2)).key
+    assert second.key != first.then(starts[8]).key

@@ -14,14 +14,9 @@ from lic_drake.errors import RequestError
 from lic_drake.experience.schema import to_records
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
-from lic_drake.reach.request import (
-    ReachRecord,
-    ReachRequest,
-    check_goal,
-    make_request,
-    request_of,
-)
+from lic_drake.reach.request import ReachRecord, ReachRequest, check_goal
 from lic_drake.reach.scenario import load_scenario
+from lic_drake.reach.start import Start
 
 SCENARIO = load_scenario("cylinder-clutter")
 
@@ -34,8 +29,8 @@ def test_keys_are_unique_over_scenarios_streams_environments_goals_and_starts() 
             scenario=scenario,
             stream=stream,
             environment=environment,
-            goal=tuple(goal.tolist()),
-            start=tuple(start.tolist()),
+            goal=goal,
+            start=Start(start),
         )
         for scenario in (SCENARIO, other)
         for stream in ("training", "evaluation")
@@ -51,17 +46,13 @@ def test_keys_are_unique_over_scenarios_streams_environments_goals_and_starts() 
 def test_the_smallest_change_of_a_number_changes_the_key() -> None:
     request = reach_request(SCENARIO)
     x, y, z = request.goal
-    a, b, c = request.start
-    twins = [
-        request,
-        replace(request, goal=(math.nextafter(x, 1.0), y, z)),
-        replace(request, goal=(x, math.nextafter(y, 1.0), z)),
-        replace(request, goal=(x, y, 1e-300)),
-        replace(request, start=(math.nextafter(a, 1.0), b, c)),
-        replace(request, start=(a, 5e-324, c)),
-        replace(request, start=(a, b, math.nextafter(c, 1.0))),
-        replace(request, goal=request.start, start=request.goal),
-    ]
+    a, b, c = request.start.x0
+    twins = [request]
+    for goal in ((math.nextafter(x, 1.0), y, z), (x, math.nextafter(y, 1.0), z), (x, y, 1e-300)):
+        twins.append(replace(request, goal=np.array(goal)))
+    for x0 in ((math.nextafter(a, 1.0), b, c), (a, 5e-324, c), (a, b, math.nextafter(c, 1.0))):
+        twins.append(replace(request, start=Start(np.array(x0))))
+    twins.append(replace(request, goal=request.start.x0, start=Start(request.goal)))
     assert len({twin.key for twin in twins}) == len(twins)
 
 
@@ -69,9 +60,10 @@ def test_keys_are_the_same_in_another_process() -> None:
     script = (
         "from lic_drake.reach.request import ReachRequest\n"
         "from lic_drake.reach.scenario import load_scenario\n"
-        "print(ReachRequest(scenario=load_scenario('cylinder-clutter'), stream='training',"
-        f" environment=0, goal={reach_request(SCENARIO).goal},"
-        f" start={reach_request(SCENARIO).start}).key)"
+        "from lic_drake.reach.start import Start\n"
+        "print(ReachRequest(load_scenario('cylinder-clutter'), 'training', 0,"
+        f" {reach_request(SCENARIO).goal.tolist()},"
+        f" Start({reach_request(SCENARIO).start.x0.tolist()})).key)"
     )
     environment = {**os.environ, "PYTHONHASHSEED": "7"}
     result = subprocess.run(
@@ -80,18 +72,38 @@ def test_keys_are_the_same_in_another_process() -> None:
     assert result.stdout.strip() == reach_request(SCENARIO).key
 
 
-def test_numpy_numbers_give_the_key_of_plain_ones() -> None:
+@pytest.mark.parametrize("goal", [[np.nan, 0.0, 0.0], [0.5, 0.0], [0.5, np.inf, 0.0]])
+def test_a_goal_that_is_no_point_is_refused(goal: list[float]) -> None:
+    with pytest.raises(RequestError, match="a goal is three finite numbers in metres, got"):
+        replace(reach_request(SCENARIO), goal=np.array(goal))
+
+
+def test_joint_angles_count_where_the_arm_has_a_choice() -> None:
     request = reach_request(SCENARIO)
-    assert replace(request, goal=tuple(np.array(request.goal))).key == request.key
+    start, (q,) = request.start, SCENARIO.arm().start_angles(request.start.x0)
+    assert replace(request, start=replace(start, q=q)).key == request.key
+    assert replace(request, start=replace(start, q=q + 0.1)).key != request.key
+    with pytest.raises(RequestError, match="planar-arm has 3 joint angles, the start has 2"):
+        replace(request, start=replace(start, q=q[:2]))
 
 
-def test_a_request_from_arrays_holds_plain_numbers() -> None:
-    expected = reach_request(SCENARIO, environment=3)
-    request = make_request(
-        SCENARIO, "training", 3, np.array(expected.goal), np.array(expected.start)
+@pytest.mark.parametrize("first_q", [None, np.full(7, 0.1)])
+@pytest.mark.parametrize("second_q", [None, np.full(7, 0.2)])
+def test_a_record_leads_back_to_prescribed_joint_angles(
+    first_q: np.ndarray | None, second_q: np.ndarray | None
+) -> None:
+    scenario = load_scenario("sphere-aperture-clutter")
+    start = Start(
+        np.array([0.5, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.1, 0.15]), first_q
     )
-    assert request == expected
-    assert all(type(value) is float for value in (*request.goal, *request.start))
+    request = ReachRequest(scenario, "training", 3, np.array([0.7, 0.0, 1.0]), start)
+    for asked in (request, request.then(replace(start, q=second_q))):
+        record = replace(make_record(asked), q_start=tuple(range(7)))
+        if asked.start.q is not None:
+            record = replace(record, q_start=tuple(asked.start.q))
+        assert ReachRequest.from_record(record, scenario) == asked
+    keys = {replace(request, start=replace(start, q=q)).key for q in (None, np.full(7, 0.1))}
+    assert len(keys) == 2
 
 
 def test_records_are_compared_without_their_wall_time() -> None:
@@ -111,7 +123,7 @@ def test_a_records_goal_and_start_are_vectors() -> None:
     request = reach_request(SCENARIO, goal=(0.6, 0.1), y_m=0.2, phi_deg=60.0)
     record = make_record(request)
     np.testing.assert_array_equal(record.p_WG, [0.6, 0.1, 0.0])
-    np.testing.assert_array_equal(record.x0, [0.335, 0.2, np.deg2rad(60.0)])
+    np.testing.assert_array_equal(record.start.x0, [0.335, 0.2, np.deg2rad(60.0)])
 
 
 def test_every_field_of_a_record_says_what_it_is() -> None:
@@ -124,7 +136,7 @@ def test_every_field_of_a_record_says_what_it_is() -> None:
     "p_WG", [[np.nan, 0.0, 0.0], [0.5, np.inf, 0.0], [0.5, 0.0], [[0.5, 0.0, 0.0]]]
 )
 def test_goals_must_be_finite_points(p_WG: list[float]) -> None:
-    with pytest.raises(RequestError, match="a goal is two finite numbers in metres, got"):
+    with pytest.raises(RequestError, match="a goal is three finite numbers in metres, got"):
         check_goal(SCENARIO, np.array(p_WG))
 
 
@@ -151,48 +163,28 @@ def test_the_keys_of_the_shipped_libraries_are_those_of_their_requests() -> None
         library = ExperienceLibrary(shipped_library(name))
         scenario, records = library.scenario(), to_records(library.table().slice(0, 400))
         for record in records:
-            request = request_of(record, scenario)
-            assert (request.base, request.after) == ((0.0, 0.0), ())
-            assert request.key == record.key
-            assert request == make_request(
-                scenario, record.stream, record.environment, record.p_WG, record.x0
-            )
+            request = ReachRequest.from_record(record, scenario)
+            assert not np.any(request.start.b0) and request.start.q is None
+            assert (request.key, request.after) == (record.key, ())
 
 
 def test_a_base_or_an_earlier_reach_makes_another_key() -> None:
     request = reach_request(SCENARIO)
-    x0, here = np.array(request.start), np.zeros(2)
-    second = request.then(x0, here)
+
+    def start(y_m: float = 0.0, x_m: float = 0.0, x0: np.ndarray = request.start.x0) -> Start:
+        return Start(x0, np.array([x_m, y_m, 0.0]))
+
+    second = request.then(start())
     twins = [
         request,
-        replace(request, base=(0.0, 0.1)),
-        replace(request, base=(0.1, 0.0)),
-        replace(request, base=(0.0, 5e-324)),
+        *(replace(request, start=start(*b0)) for b0 in ((0.1,), (0.0, 0.1), (5e-324,))),
         second,
-        second.then(x0, here),
-        request.then(x0, np.array([0.0, 0.1])),
-        replace(request, base=(0.0, 0.1)).then(x0, here),
-        request.then(x0 + [0.0, 0.0, 1e-15], here),
-        replace(request, start=(0.335, 0.1, 1.0)).then(x0, here),
+        second.then(start()),
+        request.then(start(0.1)),
+        replace(request, start=start(0.1)).then(start()),
+        request.then(start(x0=request.start.x0 + [0.0, 0.0, 1e-15])),
+        replace(request, start=Start(np.array([0.335, 0.1, 1.0]))).then(start()),
     ]
     assert len({twin.key for twin in twins}) == len(twins)
     assert all(len(twin.key) == 16 for twin in twins)
-
-
-def test_a_base_of_minus_zero_is_at_the_origin() -> None:
-    request = reach_request(SCENARIO)
-    x0, p_WG = np.array(request.start), np.array(request.goal)
-    minus = make_request(SCENARIO, "training", 0, p_WG, x0, np.array([-0.0, -0.0]))
-    assert minus.key == request.key
-    assert request.then(x0, np.array([-0.0, 0.0])).key == request.then(x0, np.zeros(2)).key
-
-
-def test_a_base_is_given_in_the_plane_or_in_space() -> None:
-    request = reach_request(SCENARIO)
-    x0, p_WG = np.array(request.start), np.array(request.goal)
-    for p_WR in (np.array([0.1, -0.2]), np.array([0.1, -0.2, 0.0])):
-        made = make_request(SCENARIO, "training", 0, p_WG, x0, p_WR)
-        assert made.base == (0.1, -0.2)
-        np.testing.assert_array_equal(made.p_WR, [0.1, -0.2, 0.0])
-        assert request.then(x0, p_WR).base == (0.1, -0.2)
-        assert all(type(value) is float for value in made.base)
+    assert replace(request, start=start(-0.0, -0.0)).key == request.key

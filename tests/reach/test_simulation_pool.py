@@ -12,6 +12,7 @@ from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.simulation_pool import SimulationPool
+from lic_drake.reach.start import Start
 from lic_drake.scene.sleep import put_to_sleep
 
 
@@ -30,7 +31,12 @@ def in_turn(requests: list[ReachRequest]) -> list[ReachRecord]:
 
 def test_a_reach_does_not_know_who_used_its_diagram_before() -> None:
     request = reach_request(small_clutter(4.0))
-    requests = [replace(request, environment=i, base=(0.0, 0.02 * i)) for i in range(4)]
+    requests = [
+        replace(
+            request, environment=i, start=Start(request.start.x0, np.array([0.0, 0.02 * i, 0.0]))
+        )
+        for i in range(4)
+    ]
     used = in_turn(requests)
     assert max(record.peak_contacts for record in used) > 0
     assert comparable(used) == comparable([fresh(request) for request in requests])
@@ -39,7 +45,8 @@ def test_a_reach_does_not_know_who_used_its_diagram_before() -> None:
 def test_the_pr2_stands_elsewhere_in_the_same_diagram() -> None:
     scenario = load_scenario("sphere-aperture-clutter", "{stop: {timeout_s: 2.0}}")
     requests = random_requests(scenario, "calibration", 2, 1)
-    requests[1] = replace(requests[1], torso=0.2)
+    start = requests[1].start
+    requests[1] = replace(requests[1], start=replace(start, b0=[*start.b0[:2], 0.2]))
     blocked = load_scenario(
         "sphere-aperture-clutter", "{clutter: {num_blocked: 10}, stop: {timeout_s: 2.0}}"
     )

@@ -11,9 +11,9 @@ from support.worlds import gap_to_boxes
 from lic_drake.errors import RequestError
 from lic_drake.reach.environment import Environment
 from lic_drake.reach.scenario import load_scenario
+from lic_drake.reach.start import Start, Starts
 from lic_drake.reach.starts import (
     ApertureStarts,
-    InitialConditions,
     LineStarts,
     find_region,
     is_possible,
@@ -29,7 +29,7 @@ BARE = load_scenario(
 )
 
 
-def angles_of(conditions: InitialConditions) -> list[np.ndarray]:
+def angles_of(conditions: Starts) -> list[np.ndarray]:
     q = [
         ARM.solve_ik(x0 - [*p_WR, 0.0])
         for x0, p_WR in zip(conditions.x0, conditions.p_WR, strict=True)
@@ -38,9 +38,9 @@ def angles_of(conditions: InitialConditions) -> list[np.ndarray]:
     return q
 
 
-def assert_all_possible(starts: LineStarts | ApertureStarts, conditions: InitialConditions) -> None:
+def assert_all_possible(starts: LineStarts | ApertureStarts, conditions: Starts) -> None:
     for x0, p_WR, q in zip(conditions.x0, conditions.p_WR, angles_of(conditions), strict=True):
-        assert_possible(starts, x0, p_WR, q)
+        assert_possible(starts, Start(x0, np.array([*p_WR, 0.0]), q))
         assert is_possible(starts, x0, p_WR)
         region = find_region(starts.regions, x0, p_WR)
         assert np.all(x0 >= region.lower - 1e-6) and np.all(x0 <= region.upper + 1e-6)

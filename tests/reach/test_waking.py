@@ -16,7 +16,7 @@ from lic_drake.reach.trace import ReachResult
 from lic_drake.reach.waking import WakingSimulation
 from lic_drake.scene import sleep
 
-X0 = np.array(reach_request(free_space()).start)
+X0 = reach_request(free_space()).start.x0
 P_WG = np.array([0.7, 0.0, 0.0])
 
 

@@ -28,7 +28,7 @@ def test_cost_is_what_a_plain_loop_finds(rates: dict[tuple[str, str, str], float
     records = ExperienceLibrary(RESULTS / "bounds/passage-clutter/factorial").records()
     cheapest: dict[int, tuple[float, bool]] = {}
     for record in records:
-        cost = float(corridor_cost(record.x0[None], record.p_WG)[0])
+        cost = float(corridor_cost(record.start.x0[None], record.p_WG)[0])
         best = cheapest.get(record.environment, (np.inf, False))
         cheapest[record.environment] = min(best, (cost, record.success))
     share = np.mean([success for _, success in cheapest.values()])

@@ -11,7 +11,7 @@ from support.starts import ARM, LINE
 from lic_drake.errors import RequestError
 from lic_drake.estimate.categories import features_of
 from lic_drake.estimate.features import PLANAR_LIC1
-from lic_drake.reach.initial_conditions import InitialConditions
+from lic_drake.reach.start import Start, Starts
 from lic_drake.select.objective import SuccessModel
 from lic_drake.select.planar_lic import PlanarLic
 from lic_drake.select.situation import FailedReach, Situation
@@ -49,10 +49,10 @@ def mixture(prior: float, one: PlanarLic, two: PlanarLic, **values: object) -> M
 
 def failed_at(start: Vector, final: tuple[float, float] = (0.45, 0.05)) -> FailedReach:
     x0 = np.array([LINE.poses.line.x_m, *start])
-    known = FailedReach.from_start(x0)
+    known = FailedReach.from_start(Start(x0))
     names = ("final_x", "final_y", "final_phi", "final_vx", "final_vy")
     shown = dict(zip(names, (*final, 0.3, 0.01, -0.02), strict=True))
-    return FailedReach(x0=x0, p_WR=known.p_WR, shown={**known.shown, **shown})
+    return FailedReach(start=Start(x0), shown={**known.shown, **shown})
 
 
 def after(*failed: FailedReach) -> Situation:
@@ -77,7 +77,7 @@ def test_values_and_gradients_are_the_weighted_sums() -> None:
     parts = [PlanarLic(ARM, random_model(seed)) for seed in (0, 1)]
     objective = mixture(0.3, *parts).objective(FIRST)
     x0 = np.array([LINE.poses.line.x_m, 0.03, 0.9])
-    at = InitialConditions(x0[None], np.zeros((1, 2)))
+    at = Starts(x0[None], np.zeros((1, 3)))
     expected = [part.objective(FIRST).values(at)[0] for part in parts]
     value, by_x0, _ = objective.value_and_gradient(x0, np.zeros(3))
     assert value == pytest.approx(0.3 * expected[0] + 0.7 * expected[1])
@@ -99,21 +99,23 @@ def test_the_likelier_category_decides_where_each_wants_another_start(
     prior: float, best: Vector
 ) -> None:
     chosen = mixture(prior, lic(0.9, 0.0), lic(0.0, 0.9)).select(FIRST)
-    np.testing.assert_allclose(chosen.x0[1:], best, atol=0.02)
+    np.testing.assert_allclose(chosen.start.x0[1:], best, atol=0.02)
     assert chosen.probability == pytest.approx(0.9 * 0.9, abs=0.01)
 
 
 def test_a_start_that_suits_both_beats_the_best_of_each() -> None:
     # Each category's favourite is ONE or nothing; TWO is second best in both.
     chosen = mixture(0.5, lic(0.9, 0.6), lic(0.0, 0.6)).select(FIRST)
-    np.testing.assert_allclose(chosen.x0[1:], TWO, atol=0.02)
+    np.testing.assert_allclose(chosen.start.x0[1:], TWO, atol=0.02)
 
 
 def test_a_category_that_is_certain_selects_as_it_does_alone() -> None:
     alone = lic(0.7, 0.2, second=(0.1, 0.6))
     certain = mixture(1.0, alone, lic(0.1, 0.9, second=(0.9, 0.0)))
     for situation in (FIRST, after(failed_at(ONE))):
-        np.testing.assert_allclose(certain.select(situation).x0, alone.select(situation).x0)
+        np.testing.assert_allclose(
+            certain.select(situation).start.x0, alone.select(situation).start.x0
+        )
 
 
 def test_a_failure_speaks_against_the_category_that_promised_success() -> None:
@@ -132,10 +134,10 @@ def test_the_second_attempt_follows_the_lic_2_of_the_category_that_is_left() -> 
     one, two = lic(0.9, 0.1, second=(0.8, 0.0)), lic(0.1, 0.3, second=(0.0, 0.6))
     situation = after(failed_at(ONE))
     updated = mixture(0.6, one, two).select(situation)
-    np.testing.assert_allclose(updated.x0[1:], TWO, atol=0.02)
+    np.testing.assert_allclose(updated.start.x0[1:], TWO, atol=0.02)
     fixed = mixture(0.6, one, two, updates=False)
     assert fixed.belief(situation) == {"one": pytest.approx(0.6), "two": pytest.approx(0.4)}
-    np.testing.assert_allclose(fixed.select(situation).x0[1:], ONE, atol=0.02)
+    np.testing.assert_allclose(fixed.select(situation).start.x0[1:], ONE, atol=0.02)
 
 
 def test_a_second_failure_counts_with_what_lic_2_promised() -> None:
@@ -146,7 +148,7 @@ def test_a_second_failure_counts_with_what_lic_2_promised() -> None:
 
 def test_without_lic_2_a_further_attempt_keeps_away_from_the_failed_one() -> None:
     chosen = mixture(0.9, lic(0.9, 0.1), lic(0.9, 0.1)).select(after(failed_at(ONE)))
-    assert abs(chosen.x0[1] - ONE[0]) > 0.1
+    assert abs(chosen.start.x0[1] - ONE[0]) > 0.1
 
 
 @dataclass(frozen=True)
@@ -167,7 +169,7 @@ def test_where_a_failure_ended_tells_categories_apart_that_fail_as_often() -> No
     selector = MixtureLic(ARM, categories)
     assert selector.belief(after(failed_at(ONE, (0.5, 0.2))))["left"] == pytest.approx(0.9)
     assert selector.belief(after(failed_at(ONE, (0.5, -0.2))))["left"] == pytest.approx(0.1)
-    unseen = FailedReach.from_start(np.array([LINE.poses.line.x_m, *ONE]))
+    unseen = FailedReach.from_start(Start(np.array([LINE.poses.line.x_m, *ONE])))
     assert selector.belief(after(unseen))["left"] == pytest.approx(0.5)
 
 

@@ -33,7 +33,7 @@ def test_without_clutter_a_reach_arrives_when_drakes_does(goal: tuple[float, flo
     scenario = free_space()
     mine = reach(scenario, start(scenario), goal)
     request = reach_request(scenario, goal)
-    drake = environment_of(request).reach(np.array(request.goal), np.array(request.start))
+    drake = environment_of(request).reach(request.goal, request.start.x0)
     assert mine.outcome == drake.outcome == "reached"
     assert mine.trace.time_s[-1] == pytest.approx(drake.trace.time_s[-1], abs=0.041)
     samples = min(len(mine.trace.q), len(drake.trace.q))

@@ -48,7 +48,7 @@ class HereExecutor:
 def reach(request: ReachRequest) -> ReachRecord:
     """In this reality only starts to the left succeed, which simulated passages advise against."""
     record = replace(make_record(request), final_x=0.5, final_y=0.0)
-    success = request.start[1] > WRONG_SIDE_Y
+    success = request.start.x0[1] > WRONG_SIDE_Y
     return replace(record, success=success, outcome="reached" if success else "stuck")
 
 

@@ -26,7 +26,7 @@ LEFT_SUCCEEDS = {"cylinder-clutter": True, "passage-clutter": False}
 def reach(request: ReachRequest) -> ReachRecord:
     """Succeeds on one side only; where a failure ends, tells the category."""
     left = LEFT_SUCCEEDS[request.scenario.category]
-    success = (request.start[1] > 0.0) == left
+    success = (request.start.x0[1] > 0.0) == left
     y = 0.2 if left else -0.2
     return replace(
         make_record(request),

@@ -7,8 +7,8 @@ from scipy.stats import chisquare
 from support.starts import APERTURES, LINE
 
 from lic_drake.errors import RequestError
-from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.reach.scenario import load_scenario
+from lic_drake.reach.start import Start, Starts
 from lic_drake.reach.starts import ApertureStarts, LineStarts, make_starts
 from lic_drake.select.baselines import (
     CostSelector,
@@ -22,7 +22,7 @@ GOAL = np.array([0.6, 0.1, 0.0])
 
 
 def failed(*starts: np.ndarray) -> tuple[FailedReach, ...]:
-    return tuple(FailedReach.from_start(x0) for x0 in starts)
+    return tuple(FailedReach.from_start(Start(x0)) for x0 in starts)
 
 
 def test_cost_of_a_hand_that_points_at_the_goal_is_its_own_corridor() -> None:
@@ -118,7 +118,7 @@ def test_in_the_horizontal_plane_space_and_plane_agree_on_the_angle() -> None:
 def test_random_selector_draws_every_start_equally_often() -> None:
     selector = RandomSelector(rng=np.random.default_rng(1))
     situation = Situation(p_WG=GOAL, starts=LINE)
-    drawn = [tuple(selector.select(situation).x0) for _ in range(4200)]
+    drawn = [tuple(selector.select(situation).start.x0) for _ in range(4200)]
     counts = [drawn.count(tuple(x0)) for x0 in LINE.grid.x0]
     assert sum(counts) == 4200
     assert chisquare(counts).pvalue > 1e-3
@@ -128,7 +128,7 @@ def test_random_selector_does_not_repeat_failed_starts() -> None:
     grid = LINE.grid.x0
     selector = RandomSelector(rng=np.random.default_rng(1))
     situation = Situation(p_WG=GOAL, starts=LINE, failed=failed(*grid[:-1]))
-    assert np.array_equal(selector.select(situation).x0, grid[-1])
+    assert np.array_equal(selector.select(situation).start.x0, grid[-1])
     with pytest.raises(RequestError, match="no start is left"):
         selector.select(Situation(p_WG=GOAL, starts=LINE, failed=failed(*grid)))
 
@@ -138,12 +138,12 @@ def test_random_selector_tries_every_pose_and_base_once_before_it_gives_up() -> 
     for _ in range(len(APERTURES.grid.x0)):
         situation = Situation(p_WG=GOAL, starts=APERTURES, failed=tuple(seen))
         chosen = selector.select(situation)
-        seen.append(FailedReach.from_start(chosen.x0, chosen.p_WR))
-    pairs = {(*reach.x0, *reach.p_WR) for reach in seen}
+        seen.append(FailedReach.from_start(chosen.start))
+    pairs = {(*reach.start.x0, *reach.start.b0[:2]) for reach in seen}
     grid = APERTURES.grid
     assert len(pairs) == len(seen)
     # Many of them are the same pose with another base.
-    assert len({tuple(reach.x0) for reach in seen}) < len(seen)
+    assert len({tuple(reach.start.x0) for reach in seen}) < len(seen)
     assert pairs == {(*x0, *p_WR) for x0, p_WR in zip(grid.x0, grid.p_WR, strict=True)}
     with pytest.raises(RequestError, match="no start is left"):
         selector.select(Situation(p_WG=GOAL, starts=APERTURES, failed=tuple(seen)))
@@ -152,17 +152,17 @@ def test_random_selector_tries_every_pose_and_base_once_before_it_gives_up() -> 
 def test_cost_selector_takes_the_cheapest_start() -> None:
     chosen = CostSelector().select(Situation(p_WG=GOAL, starts=LINE))
     costs = corridor_cost(LINE.grid.x0, GOAL)
-    assert corridor_cost(chosen.x0[None], GOAL)[0] == costs.min()
+    assert corridor_cost(chosen.start.x0[None], GOAL)[0] == costs.min()
     assert chosen.probability is None
 
 
 def test_second_cost_selection_is_the_best_away_from_the_first() -> None:
     grid = LINE.grid.x0
     first = CostSelector().select(Situation(p_WG=GOAL, starts=LINE))
-    second = CostSelector().select(Situation(p_WG=GOAL, starts=LINE, failed=failed(first.x0)))
-    away = np.abs(grid[:, 1] - first.x0[1]) > 0.1 + 1e-6
-    assert abs(second.x0[1] - first.x0[1]) > 0.1
-    assert corridor_cost(second.x0[None], GOAL)[0] == pytest.approx(
+    second = CostSelector().select(Situation(p_WG=GOAL, starts=LINE, failed=failed(first.start.x0)))
+    away = np.abs(grid[:, 1] - first.start.x0[1]) > 0.1 + 1e-6
+    assert abs(second.start.x0[1] - first.start.x0[1]) > 0.1
+    assert corridor_cost(second.start.x0[None], GOAL)[0] == pytest.approx(
         corridor_cost(grid[away], GOAL).min()
     )
 
@@ -178,9 +178,9 @@ def test_of_equally_cheap_starts_cost_takes_the_base_nearest_to_the_goals_y(
     costs = np.array([corridor_cost(x0[None], p_WG)[0] for x0 in grid.x0])
     equal = costs <= costs.min() + 1e-9
     assert np.unique(grid.p_WR[equal], axis=0).shape[0] > 1
-    assert corridor_cost(chosen.x0[None], p_WG)[0] == pytest.approx(costs.min(), abs=1e-9)
+    assert corridor_cost(chosen.start.x0[None], p_WG)[0] == pytest.approx(costs.min(), abs=1e-9)
     nearest = np.abs(grid.p_WR[equal, 1] - y).min()
-    assert abs(chosen.p_WR[1] - y) == pytest.approx(nearest, abs=1e-9)
+    assert abs(chosen.start.b0[:2][1] - y) == pytest.approx(nearest, abs=1e-9)
 
 
 def test_cost_moves_a_pr2_no_further_than_the_aperture_asks_for() -> None:
@@ -191,10 +191,10 @@ def test_cost_moves_a_pr2_no_further_than_the_aperture_asks_for() -> None:
     chosen = CostSelector(b0=b0).select(Situation(p_WG=p_WG, starts=starts))
     grid = starts.grid
     costs = corridor_cost(grid.x0, p_WG)
-    assert corridor_cost(chosen.x0[None], p_WG)[0] == pytest.approx(costs.min(), abs=1e-9)
+    assert corridor_cost(chosen.start.x0[None], p_WG)[0] == pytest.approx(costs.min(), abs=1e-9)
     here = np.abs(costs - costs.min()) < 1e-9
     least = np.linalg.norm(grid.b0[here] - b0, axis=1).min()
-    moved = np.linalg.norm([*chosen.p_WR, chosen.torso_m] - b0)
+    moved = np.linalg.norm([*chosen.start.b0[:2], chosen.start.b0[2]] - b0)
     assert moved == pytest.approx(least, abs=1e-9)
 
 
@@ -203,8 +203,8 @@ def test_selected_joint_angles_put_the_hand_at_the_start(
     starts: LineStarts | ApertureStarts,
 ) -> None:
     chosen = CostSelector().select(Situation(p_WG=GOAL, starts=starts))
-    pose = starts.poses.arm.tip_pose(chosen.q) + [*chosen.p_WR, 0.0]
-    np.testing.assert_allclose(pose, chosen.x0, atol=1e-12)
+    pose = starts.poses.arm.tip_pose(chosen.start.q) + [*chosen.start.b0[:2], 0.0]
+    np.testing.assert_allclose(pose, chosen.start.x0, atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -221,5 +221,5 @@ def test_a_start_that_is_not_possible_is_never_a_selection(
     situation = Situation(p_WG=GOAL, starts=LINE)
     with pytest.raises(RequestError, match="the arm cannot start at"):
         make_selection(
-            situation, InitialConditions(np.array([x0]), np.array([p_WR])), 0, None, "test", 0.0
+            situation, Starts(np.array([x0]), np.array([[*p_WR, 0.0]])), 0, None, "test", 0.0
         )

@@ -5,7 +5,7 @@ from support.select_surfaces import random_model
 from lic_drake.estimate.categories import features_of
 from lic_drake.estimate.features import FeatureMap
 from lic_drake.experience.second_reach import SHOWN
-from lic_drake.reach.initial_conditions import InitialConditions
+from lic_drake.reach.start import Start, Starts
 from lic_drake.select.objective import Objective
 from lic_drake.select.situation import FailedReach
 
@@ -33,18 +33,17 @@ def failure(rng: np.random.Generator, in_space: bool) -> FailedReach:
     place = ("start_x", "start_y", "start_z") if in_space else ("start_x", "start_y")
     x0 = np.array([*(shown[name] for name in place), *angles])
     torso_m = float(rng.uniform(0.0, 0.3)) if in_space else 0.0
-    return FailedReach(x0=x0, p_WR=rng.uniform(-0.3, 0.3, 2), shown=shown, torso_m=torso_m)
+    return FailedReach(start=Start(x0, np.append(rng.uniform(-0.3, 0.3, 2), torso_m)), shown=shown)
 
 
-def conditions(rng: np.random.Generator, n: int, in_space: bool = False) -> InitialConditions:
+def conditions(rng: np.random.Generator, n: int, in_space: bool = False) -> Starts:
     if in_space:
         place = rng.uniform([0.3, -0.4, 0.6], [0.6, 0.4, 1.2], (n, 3))
         # The estimate is a function of seven numbers, so their length need not be 1 here.
         x0 = np.hstack([place, rng.uniform(-1.0, 1.0, (n, 4))])
-        return InitialConditions(x0, rng.uniform(-0.3, 0.3, (n, 2)), rng.uniform(0.0, 0.3, n))
-    return InitialConditions(
-        rng.uniform([0.3, -0.4, -0.5], [0.4, 0.4, 1.5], (n, 3)), rng.uniform(-0.3, 0.3, (n, 2))
-    )
+        return Starts(x0, rng.uniform([-0.3, -0.3, 0.0], 0.3, (n, 3)))
+    x0 = rng.uniform([0.3, -0.4, -0.5], [0.4, 0.4, 1.5], (n, 3))
+    return Starts(x0, rng.uniform(-0.3, 0.3, (n, 3)) * [1.0, 1.0, 0.0])
 
 
 def objective(features: FeatureMap, failures: int, seed: int) -> Objective:
@@ -81,8 +80,7 @@ def test_gradients_by_pose_and_base_are_those_of_finite_differences(
         b0, by_b0 = b0[:2], by_b0[:2]
     m, n = len(x0), len(x0) + len(b0)
     moved = np.vstack([step * np.eye(n), -step * np.eye(n)]) + np.concatenate([x0, b0])
-    torso = moved[:, m + 2] if features.in_space else np.zeros(2 * n)
-    steps = InitialConditions(moved[:, :m], moved[:, m : m + 2], torso)
+    steps = Starts(moved[:, :m], np.pad(moved[:, m:], ((0, 0), (0, 3 + m - n))))
     ahead, behind = dut.values(steps).reshape(2, n)
     expected = (ahead - behind) / (2 * step)
     np.testing.assert_allclose(np.concatenate([by_x0, by_b0]), expected, atol=1e-7)
@@ -100,22 +98,16 @@ def test_moving_everything_together_changes_nothing(features: FeatureMap, failur
 
     def moved(reach: FailedReach) -> FailedReach:
         shown = {name: x + shift.get(name[-2:], 0.0) for name, x in reach.shown.items()}
-        return FailedReach(
-            x0=moved_pose(reach.x0),
-            p_WR=reach.p_WR + offset[:2],
-            shown=shown,
-            torso_m=reach.torso_m + offset[2],
-        )
+        start = Start(moved_pose(reach.start.x0), reach.start.b0 + offset)
+        return FailedReach(start=start, shown=shown)
 
     there = Objective(model=dut.model, p_WG=dut.p_WG + offset, failed=tuple(map(moved, dut.failed)))
-    conditions_there = InitialConditions(
-        moved_pose(at.x0), at.p_WR + offset[:2], at.torso_m + offset[2]
-    )
+    conditions_there = Starts(moved_pose(at.x0), at.b0 + offset)
     np.testing.assert_allclose(there.values(conditions_there), dut.values(at), rtol=1e-9)
     # The base alone makes a difference, and so does the torso.
-    elsewhere = [InitialConditions(at.x0, at.p_WR + [0.0, 0.05], at.torso_m)]
+    elsewhere = [Starts(at.x0, at.b0 + [0.0, 0.05, 0.0])]
     if features.in_space:
-        elsewhere.append(InitialConditions(at.x0, at.p_WR, at.torso_m + 0.05))
+        elsewhere.append(Starts(at.x0, at.b0 + [0.0, 0.0, 0.05]))
     for other in elsewhere:
         assert np.all(dut.values(other) != dut.values(at))
 

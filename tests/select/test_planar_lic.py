@@ -6,7 +6,7 @@ from support.starts import APERTURES, ARM, LINE, aperture_starts, assert_possibl
 from lic_drake.errors import RequestError
 from lic_drake.estimate.categories import features_of
 from lic_drake.estimate.features import PLANAR_LIC1
-from lic_drake.reach.initial_conditions import InitialConditions
+from lic_drake.reach.start import Start, Starts
 from lic_drake.reach.starts import ApertureStarts, LineStarts
 from lic_drake.select.objective import SuccessModel
 from lic_drake.select.planar_lic import PlanarLbfgsb, PlanarLic
@@ -23,9 +23,9 @@ def lic(surface: Bumps, kind: type[PlanarLic] = PlanarLic) -> PlanarLic:
 
 def value_of(selector: PlanarLic, situation: Situation, chosen: Selection) -> float:
     """LIC-1's estimate for a choice, from its estimator alone."""
-    y = chosen.x0[1] - chosen.p_WR[1]
-    goal = situation.p_WG[:2] - chosen.p_WR
-    return float(selector.first.estimator.values(np.array([[*goal, y, chosen.x0[2]]]))[0])
+    y = chosen.start.x0[1] - chosen.start.b0[:2][1]
+    goal = situation.p_WG[:2] - chosen.start.b0[:2]
+    return float(selector.first.estimator.values(np.array([[*goal, y, chosen.start.x0[2]]]))[0])
 
 
 def best_of_dense_scan(selector: PlanarLic, situation: Situation) -> float:
@@ -37,10 +37,11 @@ def failed_at(
     x0: np.ndarray, final: tuple[float, float] = (0.45, 0.05), p_WR: np.ndarray | None = None
 ) -> FailedReach:
     """A failure that began at x0 and ended with the hand at `final`."""
-    known = FailedReach.from_start(x0, p_WR)
+    start = Start(x0, np.zeros(3) if p_WR is None else np.array([*p_WR, 0.0]))
+    known = FailedReach.from_start(start)
     names = ("final_x", "final_y", "final_phi", "final_vx", "final_vy")
     shown = dict(zip(names, (*final, 0.3, 0.01, -0.02), strict=True))
-    return FailedReach(x0=x0, p_WR=known.p_WR, shown={**known.shown, **shown})
+    return FailedReach(start=start, shown={**known.shown, **shown})
 
 
 # A fixed base
@@ -49,7 +50,7 @@ def failed_at(
 def test_peak_inside_the_feasible_set_is_found_exactly() -> None:
     peak = np.array([0.013, 1.0])
     chosen = lic(Bumps(peak[None], np.array([0.9]), np.array([0.2, 0.6]))).select(FIRST)
-    np.testing.assert_allclose(chosen.x0[1:], peak, atol=1e-3)
+    np.testing.assert_allclose(chosen.start.x0[1:], peak, atol=1e-3)
     assert chosen.probability == pytest.approx(0.9, abs=1e-5)
 
 
@@ -59,7 +60,7 @@ def test_peak_that_the_arm_cannot_take_gives_the_best_start_at_the_joint_limits(
     chosen = selector.select(FIRST)
     assert chosen.probability is not None
     assert chosen.probability >= 0.99 * best_of_dense_scan(selector, FIRST)
-    margin = np.min(np.minimum(chosen.q - ARM.q_min, ARM.q_max - chosen.q))
+    margin = np.min(np.minimum(chosen.start.q - ARM.q_min, ARM.q_max - chosen.start.q))
     assert 0.0 <= margin + 1e-9 < np.deg2rad(2.0)
 
 
@@ -74,7 +75,7 @@ def test_selection_matches_a_dense_scan_and_beats_every_grid_start(
     assert value >= selector.objective(FIRST).values(LINE.grid).max() - 1e-12
     assert value >= 0.99 * best_of_dense_scan(selector, FIRST)
     assert chosen.probability == pytest.approx(min(value, 1.0), abs=1e-12)
-    assert_possible(LINE, chosen.x0, chosen.p_WR, chosen.q)
+    assert_possible(LINE, chosen.start)
 
 
 @pytest.mark.parametrize("kind", [PlanarLic, PlanarLbfgsb])
@@ -84,22 +85,22 @@ def test_second_selection_keeps_away_from_the_first_and_is_the_best_there(
 ) -> None:
     selector = lic(random_bumps(seed), kind)
     first = selector.select(FIRST)
-    failed = (FailedReach.from_start(first.x0),)
+    failed = (FailedReach.from_start(first.start),)
     situation = Situation(p_WG=GOAL, starts=LINE, failed=failed)
     second = selector.select(situation)
-    assert abs(second.x0[1] - first.x0[1]) > 0.1
+    assert abs(second.start.x0[1] - first.start.x0[1]) > 0.1
     value = value_of(selector, situation, second)
     assert value >= 0.99 * best_of_dense_scan(selector, situation)
 
 
 def test_where_failures_leave_no_start_at_a_distance_a_nearer_one_is_chosen() -> None:
     failed = tuple(
-        FailedReach.from_start(np.array([0.335, y, 1.0])) for y in np.arange(-0.34, 0.4, 0.1)
+        FailedReach.from_start(Start(np.array([0.335, y, 1.0]))) for y in np.arange(-0.34, 0.4, 0.1)
     )
     selector = lic(random_bumps(0))
     situation = Situation(p_WG=GOAL, starts=LINE, failed=failed)
     chosen = selector.select(situation)
-    distances = [abs(chosen.x0[1] - reach.x0[1]) for reach in failed]
+    distances = [abs(chosen.start.x0[1] - reach.start.x0[1]) for reach in failed]
     assert 0.05 < min(distances) < 0.1
     value = value_of(selector, situation, chosen)
     assert value >= 0.99 * best_of_dense_scan(selector, situation)
@@ -107,7 +108,7 @@ def test_where_failures_leave_no_start_at_a_distance_a_nearer_one_is_chosen() ->
 
 def test_selection_without_a_start_left_is_refused() -> None:
     every = LINE.grid.join(LINE.lattice)
-    failed = tuple(FailedReach.from_start(x0) for x0 in every.x0)
+    failed = tuple(FailedReach.from_start(start) for start in every)
     with pytest.raises(RequestError, match="no start is left"):
         lic(random_bumps(0)).select(Situation(p_WG=GOAL, starts=LINE, failed=failed))
 
@@ -128,7 +129,7 @@ def test_at_apertures_the_choice_matches_a_dense_scan_over_aperture_angle_and_ba
     selector = kind(ARM, random_model(seed))
     situation = Situation(p_WG=np.array([0.65, 0.2 - 0.1 * seed, 0.0]), starts=APERTURES)
     chosen = selector.select(situation)
-    assert_possible(APERTURES, chosen.x0, chosen.p_WR, chosen.q)
+    assert_possible(APERTURES, chosen.start)
     value = value_of(selector, situation, chosen)
     assert value >= 0.99 * best_of_dense_scan(selector, situation)
     assert chosen.probability == pytest.approx(min(value, 1.0), abs=1e-12)
@@ -143,7 +144,7 @@ def test_a_track_that_ends_early_bounds_the_base(kind: type[PlanarLic]) -> None:
     selector = lic(surface, kind)
     situation = Situation(p_WG=GOAL, starts=starts)
     chosen = selector.select(situation)
-    assert_possible(starts, chosen.x0, chosen.p_WR, chosen.q)
+    assert_possible(starts, chosen.start)
     value = value_of(selector, situation, chosen)
     assert value >= 0.99 * best_of_dense_scan(selector, situation)
 
@@ -154,11 +155,11 @@ def test_after_a_failure_lic1_takes_the_best_of_the_other_apertures(
 ) -> None:
     selector = kind(ARM, random_model(3))
     first = selector.select(Situation(p_WG=GOAL, starts=APERTURES))
-    failed = (FailedReach.from_start(first.x0, first.p_WR),)
+    failed = (FailedReach.from_start(first.start),)
     situation = Situation(p_WG=GOAL, starts=APERTURES, failed=failed)
     second = selector.select(situation)
-    assert second.x0[1] != first.x0[1]
-    assert_possible(APERTURES, second.x0, second.p_WR, second.q)
+    assert second.start.x0[1] != first.start.x0[1]
+    assert_possible(APERTURES, second.start)
     value = value_of(selector, situation, second)
     assert value >= 0.99 * best_of_dense_scan(selector, situation)
 
@@ -188,8 +189,8 @@ def test_a_translated_situation_has_the_translated_answer_and_the_same_estimate(
 
     here, there = choose((0.0, 0.0)), choose(offset)
     assert there.probability == pytest.approx(here.probability, abs=1e-6)
-    np.testing.assert_allclose(there.x0 - [*offset, 0.0], here.x0, atol=2e-3)
-    np.testing.assert_allclose(there.p_WR - offset, here.p_WR, atol=2e-3)
+    np.testing.assert_allclose(there.start.x0 - [*offset, 0.0], here.start.x0, atol=2e-3)
+    np.testing.assert_allclose(there.start.b0[:2] - offset, here.start.b0[:2], atol=2e-3)
 
 
 # LIC-2
@@ -206,13 +207,13 @@ def test_lic2_takes_the_best_of_all_starts_after_what_the_failure_showed(
         failed = failed_at(starts.grid.x0[9], final, starts.grid.p_WR[9])
         situation = Situation(p_WG=GOAL, starts=starts, failed=(failed,))
         chosen = selector.select(situation)
-        assert_possible(starts, chosen.x0, chosen.p_WR, chosen.q)
-        base = chosen.p_WR
+        assert_possible(starts, chosen.start)
+        base = chosen.start.b0[:2]
         z = [
             *(GOAL[:2] - base),
-            *(failed.x0[1] - base[1], failed.x0[2]),
+            *(failed.start.x0[1] - base[1], failed.start.x0[2]),
             *(np.array(final) - base),
-            *(chosen.x0[1] - base[1], chosen.x0[2]),
+            *(chosen.start.x0[1] - base[1], chosen.start.x0[2]),
         ]
         value = float(selector.second.estimator.values(np.array([z]))[0])
         assert chosen.probability == pytest.approx(min(value, 1.0), abs=1e-9)
@@ -231,7 +232,7 @@ def test_lic2_may_start_where_the_first_reach_did() -> None:
     )
     selector = PlanarLic(ARM, random_model(1), second)
     situation = Situation(p_WG=GOAL, starts=LINE, failed=(failed_at(np.array([0.335, 0.05, 0.9])),))
-    np.testing.assert_allclose(selector.select(situation).x0[1:], peak[0], atol=2e-3)
+    np.testing.assert_allclose(selector.select(situation).start.x0[1:], peak[0], atol=2e-3)
 
 
 def test_a_failure_that_never_began_leaves_lic1_away_from_it() -> None:
@@ -239,13 +240,13 @@ def test_a_failure_that_never_began_leaves_lic1_away_from_it() -> None:
     alone = PlanarLic(ARM, random_model(1))
     first = alone.select(FIRST)
     for failed in (
-        FailedReach.from_start(first.x0),
-        failed_at(first.x0, (np.nan, np.nan)),
+        FailedReach.from_start(first.start),
+        failed_at(first.start.x0, (np.nan, np.nan)),
     ):
         situation = Situation(p_WG=GOAL, starts=LINE, failed=(failed,))
         chosen = selector.select(situation)
-        assert abs(chosen.x0[1] - first.x0[1]) > 0.1
-        np.testing.assert_array_equal(chosen.x0, alone.select(situation).x0)
+        assert abs(chosen.start.x0[1] - first.start.x0[1]) > 0.1
+        np.testing.assert_array_equal(chosen.start.x0, alone.select(situation).start.x0)
         assert chosen.probability == alone.select(situation).probability
 
 
@@ -259,14 +260,19 @@ def test_after_several_failures_the_choice_maximises_the_smallest_of_their_estim
     )
     chosen = selector.select(Situation(p_WG=GOAL, starts=LINE, failed=failed))
 
-    def smallest(conditions: InitialConditions) -> np.ndarray:
+    def smallest(conditions: Starts) -> np.ndarray:
         n, estimates = len(conditions.x0), []
         for reach in failed:
-            seen = [reach.x0[1], reach.x0[2], reach.shown["final_x"], reach.shown["final_y"]]
+            seen = [
+                reach.start.x0[1],
+                reach.start.x0[2],
+                reach.shown["final_x"],
+                reach.shown["final_y"],
+            ]
             Z = np.column_stack([np.tile([*GOAL[:2], *seen], (n, 1)), conditions.x0[:, 1:]])
             estimates.append(second.estimator.values(Z))
         return np.min(estimates, axis=0)
 
-    value = smallest(InitialConditions(chosen.x0[None], chosen.p_WR[None]))[0]
+    value = smallest(Starts.of(chosen.start))[0]
     assert chosen.probability == pytest.approx(min(value, 1.0), abs=1e-12)
     assert value >= 0.99 * smallest(dense_scan(LINE)).max()

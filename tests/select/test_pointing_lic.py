@@ -7,9 +7,9 @@ from lic_drake.errors import RequestError
 from lic_drake.estimate.categories import features_of
 from lic_drake.estimate.features import SPACE_LIC1
 from lic_drake.experience.second_reach import SHOWN
-from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.reach.pointing_starts import PointingStarts, pointing_starts
 from lic_drake.reach.scenario import load_scenario
+from lic_drake.reach.start import Start, Starts
 from lic_drake.reach.starts import make_starts, planar_starts
 from lic_drake.select.baselines import CostSelector, RandomSelector, corridor_cost
 from lic_drake.select.objective import SuccessModel
@@ -55,11 +55,11 @@ def test_the_answer_is_possible_and_at_least_the_best_of_the_grid(
     selector = kind(MODEL)
     chosen = selector.select(asked)
     # By kinematics that do not read the model.
-    X_WE = link_poses((*chosen.p_WR, 0.0), chosen.torso_m, chosen.q)[7]
-    np.testing.assert_allclose(X_WE[:3, 3], chosen.x0[:3], atol=1e-9)
+    X_WE = link_poses((*chosen.start.b0[:2], 0.0), chosen.start.b0[2], chosen.start.q)[7]
+    np.testing.assert_allclose(X_WE[:3, 3], chosen.start.x0[:3], atol=1e-9)
     np.testing.assert_allclose(X_WE[:3, 0], [1.0, 0.0, 0.0], atol=1e-9)
-    assert np.min(np.linalg.norm(starts_of(asked).p_WA - chosen.x0[:3], axis=1)) < 1e-9
-    condition = InitialConditions(chosen.x0[None], chosen.p_WR[None], np.array([chosen.torso_m]))
+    assert np.min(np.linalg.norm(starts_of(asked).p_WA - chosen.start.x0[:3], axis=1)) < 1e-9
+    condition = Starts.of(chosen.start)
     objective = selector.objective(asked)
     value = objective.values(condition)[0]
     assert value == pytest.approx(chosen.probability)
@@ -107,17 +107,17 @@ def test_a_translated_situation_has_a_translated_answer() -> None:
         asked = Situation(p_WG=np.array([0.84, -0.2 + shift, 0.9]), starts=starts)
         chosen.append(PointingLic(MODEL).select(asked))
     here, there = chosen
-    np.testing.assert_allclose(there.x0 - here.x0, [0.0, 0.1, *np.zeros(5)], atol=2e-4)
-    np.testing.assert_allclose(there.p_WR - here.p_WR, [0.0, 0.1], atol=2e-4)
-    assert there.torso_m == pytest.approx(here.torso_m, abs=2e-4)
+    np.testing.assert_allclose(there.start.x0 - here.start.x0, [0.0, 0.1, *np.zeros(5)], atol=2e-4)
+    np.testing.assert_allclose(there.start.b0[:2] - here.start.b0[:2], [0.0, 0.1], atol=2e-4)
+    assert there.start.b0[2] == pytest.approx(here.start.b0[2], abs=2e-4)
     assert there.probability == pytest.approx(here.probability, abs=1e-4)
 
 
 def test_a_further_attempt_goes_through_another_aperture() -> None:
     first = PointingLic(MODEL).select(situation(0))
-    failed = FailedReach.from_start(first.x0, first.p_WR, first.torso_m)
+    failed = FailedReach.from_start(first.start)
     second = PointingLic(MODEL).select(situation(0, failed))
-    assert np.linalg.norm(second.x0[:3] - first.x0[:3]) > 0.19
+    assert np.linalg.norm(second.start.x0[:3] - first.start.x0[:3]) > 0.19
 
 
 def test_lic_2_knows_where_the_first_reach_began() -> None:
@@ -146,28 +146,28 @@ def test_lic_2_knows_where_the_first_reach_began() -> None:
     k = 0
     x0 = np.array([*p_WA[k], 1.0, 0.0, 0.0, 0.0])
     shown = dict.fromkeys(SHOWN, 0.0) | {"start_y": x0[1], "start_z": x0[2]}
-    failed = FailedReach(x0=x0, p_WR=np.array([0.0, 0.1]), shown=shown, torso_m=0.2)
+    failed = FailedReach(start=Start(x0, np.array([0.0, 0.1, 0.2])), shown=shown)
     chosen = PointingLic(MODEL, model).select(situation(1, failed))
     reachable = np.unique(asked.starts.grid.x0[:, :3], axis=0)
     farthest = reachable[np.argmax(np.linalg.norm(reachable - x0[:3], axis=1))]
-    np.testing.assert_allclose(chosen.x0[:3], farthest)
+    np.testing.assert_allclose(chosen.start.x0[:3], farthest)
 
 
 def test_rnd_draws_among_all_and_cost_takes_the_nearest_aperture_to_the_goal() -> None:
     asked = situation(2)
     rng = np.random.default_rng(0)
     drawn = [RandomSelector(rng=rng).select(asked) for _ in range(60)]
-    assert len({tuple(chosen.x0[:3]) for chosen in drawn}) >= 8
-    assert len({chosen.torso_m for chosen in drawn}) >= 5
+    assert len({tuple(chosen.start.x0[:3]) for chosen in drawn}) >= 8
+    assert len({chosen.start.b0[2] for chosen in drawn}) >= 5
     cost = make_selector("cost", BLOCKED.arm())
     assert isinstance(cost, CostSelector)
     chosen = cost.select(asked)
     costs = corridor_cost(asked.starts.grid.x0, asked.p_WG)
-    assert corridor_cost(chosen.x0[None], asked.p_WG)[0] == pytest.approx(costs.min())
+    assert corridor_cost(chosen.start.x0[None], asked.p_WG)[0] == pytest.approx(costs.min())
     # Of the same aperture the place that is nearest to where base and torso are.
     same = asked.starts.grid.take(np.isclose(costs, costs.min()))
     here = np.array([0.0, 0.0, BLOCKED.task.torso_m])
-    moved = np.linalg.norm([*chosen.p_WR, chosen.torso_m] - here)
+    moved = np.linalg.norm(chosen.start.b0 - here)
     assert moved == pytest.approx(np.linalg.norm(same.b0 - here, axis=1).min())
 
 
@@ -187,7 +187,7 @@ def test_no_place_between_those_of_the_grid_is_better() -> None:
         )
         found = starts.pre_select(starts.p_WA[rng.integers(len(starts.p_WA))], b0)
         if found is not None:
-            at = InitialConditions(found[0][None], b0[None, :2], b0[2:])
+            at = Starts(found[0][None], b0[None])
             value = selector.objective(asked).values(at)[0]
             assert chosen.probability is not None and chosen.probability > value - 0.01
 
@@ -200,15 +200,15 @@ def test_a_further_attempt_with_lic_2_does_not_begin_where_the_first_one_failed(
     selector = PointingLic(MODEL, model)
     first = selector.select(situation(0))
     shown = dict.fromkeys(SHOWN, 0.0)
-    failed = FailedReach(x0=first.x0, p_WR=first.p_WR, shown=shown, torso_m=first.torso_m)
+    failed = FailedReach(start=first.start, shown=shown)
     second = selector.select(situation(0, failed))
-    moved = np.linalg.norm([*(second.p_WR - first.p_WR), second.torso_m - first.torso_m])
-    assert np.linalg.norm(second.x0[:3] - first.x0[:3]) > 0.19 or moved >= RETRY_M
+    moved = np.linalg.norm(second.start.b0 - first.start.b0)
+    assert np.linalg.norm(second.start.x0[:3] - first.start.x0[:3]) > 0.19 or moved >= RETRY_M
     # As seen again, the aperture is the same one.
     seen = FailedReach(
-        x0=first.x0 + [0, 0.01, *np.zeros(5)], p_WR=first.p_WR, shown=shown, torso_m=first.torso_m
+        start=Start(first.start.x0 + [0, 0.01, *np.zeros(5)], first.start.b0), shown=shown
     )
-    at = InitialConditions(first.x0[None], first.p_WR[None], np.array([first.torso_m]))
+    at = Starts.of(first.start)
     assert not is_apart(situation(0, seen), at)[0]
 
 
@@ -236,5 +236,5 @@ def test_a_robot_that_stays_can_still_choose_its_aperture() -> None:
     instance = SCENARIO.sample_instance("holdout", 0)
     starts = pointing_starts(SCENARIO, instance)
     chosen = PointingLic(MODEL).select(Situation(p_WG=np.array([0.84, -0.2, 0.9]), starts=starts))
-    np.testing.assert_array_equal(chosen.p_WR, [0.0, 0.0])
-    assert chosen.torso_m == 0.15
+    np.testing.assert_array_equal(chosen.start.b0[:2], [0.0, 0.0])
+    assert chosen.start.b0[2] == 0.15

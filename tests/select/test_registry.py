@@ -7,6 +7,7 @@ from support.starts import ARM, LINE
 
 from lic_drake.errors import RequestError
 from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.reach.start import Start
 from lic_drake.robots.pr2 import Pr2Arm
 from lic_drake.select.baselines import CostSelector, RandomSelector
 from lic_drake.select.planar_lic import PlanarLic
@@ -86,7 +87,7 @@ def test_only_the_plain_name_has_lic2(columns: dict[str, np.ndarray]) -> None:
         *("first_final_x", "first_final_y"),
     )
     situation = Situation(p_WG=GOAL, starts=LINE)
-    np.testing.assert_array_equal(both.select(situation).x0, first.select(situation).x0)
+    np.testing.assert_array_equal(both.select(situation).start.x0, first.select(situation).start.x0)
 
 
 def test_one_strategy_for_the_first_attempt_and_another_for_all_later_ones() -> None:
@@ -101,7 +102,7 @@ def test_one_strategy_for_the_first_attempt_and_another_for_all_later_ones() -> 
         return Noting(rng=np.random.default_rng(0), method=name)
 
     selector = FallbackSelector(first=noting("a"), later=noting("b"), method="a>b")
-    failed = tuple(FailedReach.from_start(x0) for x0 in LINE.grid.x0[:2])
+    failed = tuple(FailedReach.from_start(Start(x0)) for x0 in LINE.grid.x0[:2])
     for n in (0, 1, 2):
         selector.select(Situation(p_WG=GOAL, starts=LINE, failed=failed[:n]))
     assert asked == [("a", 0), ("b", 1), ("b", 2)]

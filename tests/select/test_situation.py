@@ -9,12 +9,16 @@ from support.reaches import reach_request
 from support.starts import APERTURES, LINE
 
 from lic_drake.errors import RequestError
-from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.reach.scenario import load_scenario
+from lic_drake.reach.start import Start, Starts
 from lic_drake.reach.starts import ApertureStarts, LineStarts
 from lic_drake.select.situation import FailedReach, Situation
 
 GOAL = np.array([0.6, 0.1, 0.0])
+
+
+def failed_from(y_m: float) -> FailedReach:
+    return FailedReach.from_start(Start(np.array([0.335, y_m, 0.5])))
 
 
 @given(
@@ -27,11 +31,13 @@ def test_free_regions_are_the_allowed_positions(
 ) -> None:
     if starts is APERTURES:
         y = float(APERTURES.p_WA[np.argmin(np.abs(APERTURES.p_WA[:, 1] - y)), 1])
-    failed = tuple(FailedReach.from_start(np.array([0.335, value, 0.5])) for value in failed_y)
+    failed = tuple(
+        FailedReach.from_start(Start(np.array([0.335, value, 0.5]))) for value in failed_y
+    )
     situation = Situation(p_WG=GOAL, starts=starts, failed=failed)
     regions = situation.free_regions()
     inside = any(region.lower[1] <= y <= region.upper[1] for region in regions)
-    at = InitialConditions(np.array([[0.335, y, 0.0]]), np.zeros((1, 2)))
+    at = Starts(np.array([[0.335, y, 0.0]]), np.zeros((1, 3)))
     distance = situation.retry_distance_m
     near_an_edge = any(abs(abs(y - value) - distance) < 1e-5 for value in failed_y)
     assert inside == bool(situation.allowed(at)[0]) or near_an_edge
@@ -57,16 +63,17 @@ def test_the_neighbourhood_of_failures_is_as_large_as_leaves_a_start_of_the_grid
     starts: LineStarts | ApertureStarts, failed_y: list[float], failed_rows: list[int]
 ) -> None:
     grid = starts.grid
-    failed = [FailedReach.from_start(np.array([0.335, value, 0.5])) for value in failed_y]
-    failed += [FailedReach.from_start(grid.x0[i], grid.p_WR[i]) for i in failed_rows]
+    failed = [failed_from(value) for value in failed_y]
+    failed += [FailedReach.from_start(grid[i]) for i in failed_rows]
     situation = Situation(p_WG=GOAL, starts=starts, failed=tuple(failed))
     allowed = situation.allowed(grid)
     nearest = np.min(
-        [np.full(len(grid.x0), np.inf), *(np.abs(grid.x0[:, 1] - r.x0[1]) for r in failed)], axis=0
+        [np.full(len(grid.x0), np.inf), *(np.abs(grid.x0[:, 1] - r.start.x0[1]) for r in failed)],
+        axis=0,
     )
     repeated = np.array(
         [
-            any(np.allclose(x0, r.x0) and np.allclose(p_WR, r.p_WR) for r in failed)
+            any(np.allclose(x0, r.start.x0) and np.allclose(p_WR, r.start.b0[:2]) for r in failed)
             for x0, p_WR in zip(grid.x0, grid.p_WR, strict=True)
         ]
     )
@@ -80,12 +87,13 @@ def test_the_neighbourhood_of_failures_is_as_large_as_leaves_a_start_of_the_grid
 
 @pytest.mark.parametrize("y_m", [0.0, -0.3])  # Those of this library never begin at y = -0.3 m.
 def test_a_failed_reach_shows_what_its_record_says_in_the_world(y_m: float) -> None:
-    request = replace(reach_request(load_scenario("cylinder-clutter"), y_m=y_m), base=(0.1, -0.2))
+    request = reach_request(load_scenario("cylinder-clutter"), y_m=y_m)
+    request = replace(request, start=Start(request.start.x0, np.array([0.1, -0.2, 0.0])))
     record = make_record(request)
     failed = FailedReach.from_record(record)
-    np.testing.assert_array_equal(failed.x0, request.start)
-    np.testing.assert_array_equal(failed.p_WR, [0.1, -0.2])
-    assert [failed.shown[n] for n in ("start_x", "start_y", "start_phi")] == list(request.start)
+    np.testing.assert_array_equal(failed.start.x0, request.start.x0)
+    np.testing.assert_array_equal(failed.start.b0[:2], [0.1, -0.2])
+    assert [failed.shown[n] for n in ("start_x", "start_y", "start_phi")] == list(request.start.x0)
     final = ("final_x", "final_y", "final_phi", "final_vx", "final_vy")
     np.testing.assert_array_equal(
         [failed.shown[name] for name in final], [getattr(record, name) for name in final]
@@ -102,7 +110,7 @@ class InSpace:
         places = [(y, z) for y in (-0.3, 0.1) for z in (0.7, 0.9, 1.1)]
         x0 = np.array([[0.53, y, z, 1.0, 0.0, 0.0, 0.0] for y, z in places])
         torso_m = np.repeat([0.1, 0.2], len(x0))
-        self.grid = InitialConditions(np.vstack([x0, x0]), np.zeros((12, 2)), torso_m)
+        self.grid = Starts(np.vstack([x0, x0]), np.pad(torso_m[:, None], ((0, 0), (2, 0))))
 
     def angles(self, x0: np.ndarray, p_WR: np.ndarray, torso_m: float) -> np.ndarray | None:
         return np.zeros(7)
@@ -114,17 +122,19 @@ def test_in_space_starts_keep_their_distance_across_x_in_both_directions() -> No
     near = np.linalg.norm(starts.grid.x0[:, 1:3] - [-0.3, 0.9], axis=1) <= 0.1
     assert np.count_nonzero(near) == 2  # The same place from both heights of the torso.
     situation = Situation(
-        p_WG=GOAL, starts=starts, failed=(FailedReach.from_start(at, np.zeros(2), 0.1),)
+        p_WG=GOAL,
+        starts=starts,
+        failed=(FailedReach.from_start(Start(at, np.array([0.0, 0.0, 0.1]))),),
     )
     np.testing.assert_array_equal(situation.allowed(starts.grid), ~near)
     # Deeper or further up the way makes no difference.
-    deeper = InitialConditions(starts.grid.x0 + np.eye(7)[0], starts.grid.p_WR, starts.grid.torso_m)
+    deeper = Starts(starts.grid.x0 + np.eye(7)[0], starts.grid.b0)
     np.testing.assert_array_equal(situation.allowed(deeper), ~near)
 
 
 def test_the_same_pose_from_another_torso_is_another_start() -> None:
     starts = InSpace()
-    failed = tuple(FailedReach.from_start(x0, np.zeros(2), 0.1) for x0 in starts.grid.x0[:6])
+    failed = tuple(FailedReach.from_start(starts.grid[i]) for i in range(6))
     situation = Situation(p_WG=GOAL, starts=starts, failed=failed)
     from_above = starts.grid.torso_m == 0.2
     np.testing.assert_array_equal(situation.untried(starts.grid), from_above)
@@ -135,8 +145,8 @@ def test_the_same_pose_from_another_torso_is_another_start() -> None:
 
 def test_a_failure_in_space_is_known_by_position_quaternion_and_torso() -> None:
     x0 = np.array([0.53, -0.3, 0.9, 0.8, 0.6, 0.0, 0.0])
-    failed = FailedReach.from_start(x0, np.array([0.0, 0.1]), 0.2)
-    assert failed.torso_m == 0.2
+    failed = FailedReach.from_start(Start(x0, np.array([0.0, 0.1, 0.2])))
+    assert failed.start.b0[2] == 0.2
     names = [f"start_{axis}" for axis in ("x", "y", "z", "qw", "qx", "qy", "qz")]
     assert list(failed.shown) == names
     np.testing.assert_array_equal([failed.shown[name] for name in names], x0)
@@ -148,9 +158,9 @@ def test_a_failed_reach_in_space_shows_heights_and_torso_of_its_record() -> None
     record = replace(planar, start_qw=0.8, **heights)
     failed = FailedReach.from_record(record)
     np.testing.assert_array_equal(
-        failed.x0, [record.start_x, record.start_y, 0.9, 0.8, 0.6, 0.0, 0.0]
+        failed.start.x0, [record.start_x, record.start_y, 0.9, 0.8, 0.6, 0.0, 0.0]
     )
-    assert failed.torso_m == 0.2
+    assert failed.start.b0[2] == 0.2
     assert [failed.shown[name] for name in list(heights)[:4]] == [0.9, 0.6, 1.0, -0.1]
 
 

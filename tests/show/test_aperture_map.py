@@ -2,9 +2,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.reach.pointing_starts import pointing_starts
 from lic_drake.reach.scenario import load_scenario
+from lic_drake.reach.start import Starts
 from lic_drake.select.objective import Objective
 from lic_drake.show.aperture_map import draw_aperture_map, estimate_apertures
 
@@ -15,7 +15,7 @@ STARTS = pointing_starts(BLOCKED, BLOCKED.sample_instance("holdout", 0))
 class HeightAlone(Objective):
     """Estimates that are the height of the tool, beyond 1 for the highest."""
 
-    def values(self, conditions: InitialConditions) -> np.ndarray:
+    def values(self, conditions: Starts) -> np.ndarray:
         return conditions.x0[:, 2]
 
 

@@ -54,7 +54,7 @@ def _made_up(path: Path, scenario: Scenario) -> ExperienceLibrary:
     request = make_request(scenario=scenario, max_starts=None)
     for environment in request.environment_indices:
         records = [
-            replace(make_record(item), success=item.start[1] > item.base[1])
+            replace(make_record(item), success=item.start.x0[1] > item.start.b0[1])
             for item in request.reaches(environment)
         ]
         library.write_shard(f"training-{environment}", records, scenario)
@@ -96,7 +96,7 @@ def test_second_attempt_starts_elsewhere_and_finds_what_the_first_left(
     }
     first, second = result.attempts
     assert first.record.outcome == second.record.outcome == "timeout"
-    assert abs(first.selection.x0[1] - second.selection.x0[1]) > 0.1
+    assert abs(first.selection.start.x0[1] - second.selection.start.x0[1]) > 0.1
     assert not np.isnan(second.record.min_distance)
     assert first.request.after == ()
     assert second.request.before() == first.request
@@ -113,8 +113,10 @@ def test_a_demonstration_at_apertures_says_where_the_base_stands(
     assert len(result.attempts) == 2
     said = [line for line in lines if "starts at y" in line]
     for attempt, line in zip(result.attempts, said, strict=True):
-        assert f"base at y {attempt.selection.p_WR[1]:+.3f} m" in line
-        assert (attempt.record.base_x, attempt.record.base_y) == tuple(attempt.selection.p_WR)
+        assert f"base at y {attempt.selection.start.b0[1]:+.3f} m" in line
+        assert (attempt.record.base_x, attempt.record.base_y) == tuple(
+            attempt.selection.start.b0[:2]
+        )
         assert attempt.record == run_reach(attempt.request)
     # From somewhere on the track the goal is near enough.
     nearest = result.p_WG - [0.0, np.clip(result.p_WG[1], -0.6, 0.6), 0.0]

@@ -12,8 +12,9 @@ from lic_drake.experience.grid import REQUEST_FILE, CollectionRequest, write_req
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.perception.config import CamerasConfig, load_cameras
 from lic_drake.perception.observer import Observer
-from lic_drake.reach.request import make_request
+from lic_drake.reach.request import ReachRequest
 from lic_drake.reach.scenario import Scenario, load_scenario
+from lic_drake.reach.start import Start
 from lic_drake.show.demonstration import demonstrate
 
 SHORT = "{stop: {timeout_s: 0.2}, clutter: {num_stems: 3, num_branches: 1}}"
@@ -49,7 +50,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> ExperienceLibrary:
     for environment in request.environment_indices:
         records = []
         for item in request.reaches(environment):
-            apart = np.hypot(item.start[1] - item.goal[1], item.start[2] - item.goal[2])
+            apart = np.hypot(item.start.x0[1] - item.goal[1], item.start.x0[2] - item.goal[2])
             records.append(replace(make_record(item), success=bool(apart < 0.2)))
         library.write_shard(f"training-{environment:06d}", records, spheres)
     write_request(request, library.path / REQUEST_FILE)
@@ -87,7 +88,11 @@ def test_success_is_to_touch_the_ball(scenario: Scenario, cameras: CamerasConfig
         scenario=scenario, stream="training", environment=0, p_WG=p_WG, cameras=cameras
     )
     x0 = np.array([0.5, 0.0, 0.9, 1.0, 0.0, 0.0, 0.0])
-    record = make_record(make_request(scenario, "training", 0, p_WG, x0))
+    record = make_record(
+        ReachRequest(
+            scenario, "training", 0, p_WG, Start(x0, np.array([0.0, 0.0, scenario.task.torso_m]))
+        )
+    )
     for off, success, touches in ((0.02, True, True), (0.04, True, False), (0.02, False, False)):
         end = replace(record, final_x=0.84, final_y=-0.1 + off, final_z=0.9, success=success)
         assert observer.touches_ball(end) == touches

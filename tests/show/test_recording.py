@@ -18,7 +18,7 @@ from lic_drake.show.recording import PAUSE_S, ReachRecording, frame_rate
 
 TICKS_PER_SECOND = 250
 P_WG = np.array([0.6, 0.1, 0.0])
-EASY_START = np.array(reach_request(free_space()).start)
+EASY_START = reach_request(free_space()).start.x0
 LAST_LINK = b"/drake/visualizer/planar_arm/link3"
 
 

@@ -25,9 +25,7 @@ def attempt() -> tuple[Attempt, ReachTrace]:
     record = make_record(REQUEST, result, 0.0)
     selection = Selection(
         method="rnd",
-        x0=np.array(REQUEST.start),
-        p_WR=np.zeros(2),
-        q=np.zeros(3),
+        start=REQUEST.start,
         probability=None,
         seconds=0.0,
     )

@@ -11,8 +11,9 @@ from pathlib import Path
 
 from lic_drake.experience.grid import REQUEST_FILE, CollectionRequest, write_request
 from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.reach.request import IN_PLANE, ReachRecord, ReachRequest
+from lic_drake.reach.request import ReachRecord, ReachRequest, flat_starts
 from lic_drake.reach.scenario import load_scenario
+from lic_drake.reach.start import IN_PLANE
 
 
 def make_request(**values: object) -> CollectionRequest:
@@ -35,7 +36,8 @@ def fill_library(path: Path) -> Path:
 def make_record(request: ReachRequest) -> ReachRecord:
     """A record whose numbers are drawn from the key; reaches from y = -0.3 m never began."""
     digest = hashlib.sha256(request.key.encode()).digest()
-    began = len(request.start) != IN_PLANE or request.start[1] > -0.25
+    x0, b0 = request.start.x0.tolist(), request.start.b0.tolist()
+    began = len(x0) != IN_PLANE or x0[1] > -0.25
     success = began and digest[0] % 2 == 1
     numbers = [int.from_bytes(digest[i : i + 4]) / 2**32 if began else math.nan for i in range(12)]
     return ReachRecord(
@@ -45,12 +47,12 @@ def make_record(request: ReachRequest) -> ReachRecord:
         scenario=request.scenario.digest,
         stream=request.stream,
         environment=request.environment,
-        goal_x=request.goal[0],
-        goal_y=request.goal[1],
-        goal_z=request.goal[2],
-        start_x=request.start[0],
-        start_y=request.start[1],
-        start_phi=request.start[2] if len(request.start) == IN_PLANE else 0.0,
+        goal_x=float(request.goal[0]),
+        goal_y=float(request.goal[1]),
+        goal_z=float(request.goal[2]),
+        start_x=x0[0],
+        start_y=x0[1],
+        start_phi=x0[2] if len(x0) == IN_PLANE else 0.0,
         outcome="reached" if success else "stuck" if began else "invalid_start",
         success=success,
         final_x=numbers[0],
@@ -70,11 +72,11 @@ def make_record(request: ReachRequest) -> ReachRecord:
         detail="" if began else 'the arm touches "success": true\r\n at its start',
         lic_drake_version="0.1.0",
         drake_version="1.58.0",
-        base_x=request.base[0],
-        base_y=request.base[1],
-        after=tuple(x for earlier in request.after for x in earlier.flat()),
-        torso=request.torso,
-        **_pose_in_space(request.start, numbers),
+        base_x=b0[0],
+        base_y=b0[1],
+        after=flat_starts(request.after),
+        torso=b0[2],
+        **_pose_in_space(tuple(x0), numbers),
     )
 
 

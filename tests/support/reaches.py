@@ -8,6 +8,7 @@ from pydrake.systems.framework import Context
 from lic_drake.reach.diagram import ReachDiagram
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.scenario import Scenario, load_scenario
+from lic_drake.reach.start import Start
 
 START_Y_M, START_PHI_DEG = 0.0, 60.0
 """A start of the grid from which a goal straight ahead is easy."""
@@ -44,14 +45,14 @@ def reach_request(
         scenario=scenario,
         stream=stream,
         environment=environment,
-        goal=(goal[0], goal[1], 0.0),
-        start=(scenario.task.start_line.x_m, y_m, float(np.deg2rad(phi_deg))),
+        goal=np.array([*goal, 0.0]),
+        start=Start(np.array([scenario.task.start_line.x_m, y_m, np.deg2rad(phi_deg)])),
     )
 
 
 def start_angles(scenario: Scenario) -> np.ndarray:
     """Joint angles of the easy start, shape (3,), radians."""
-    q = scenario.arm().solve_ik(np.array(reach_request(scenario).start))
+    q = scenario.arm().solve_ik(reach_request(scenario).start.x0)
     assert q is not None
     return q
 

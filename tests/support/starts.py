@@ -7,8 +7,8 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.plant import MultibodyPlant
 
 from lic_drake.reach.hand_poses import HandPoses
-from lic_drake.reach.initial_conditions import InitialConditions
 from lic_drake.reach.scenario import load_scenario
+from lic_drake.reach.start import Start, Starts
 from lic_drake.reach.starts import ApertureStarts, LineStarts
 from lic_drake.reach.task import BaseTrack, StartLine
 from lic_drake.robots.planar import planar_arm
@@ -61,10 +61,10 @@ def hand_pose_by_drake(q: np.ndarray, p_WR: np.ndarray) -> np.ndarray:
     return np.array([x + p_WR[0], y + p_WR[1], angle])
 
 
-def assert_possible(
-    starts: LineStarts | ApertureStarts, x0: np.ndarray, p_WR: np.ndarray, q: np.ndarray
-) -> None:
-    """Checks an initial condition and its joint angles against the task and Drake's kinematics."""
+def assert_possible(starts: LineStarts | ApertureStarts, start: Start) -> None:
+    """Checks a start with joint angles against the task and Drake's kinematics."""
+    x0, p_WR, q = start.x0, start.b0[:2], start.q
+    assert q is not None
     np.testing.assert_allclose(hand_pose_by_drake(q, p_WR), x0, atol=1e-9)
     assert np.all(q >= ARM.q_min - 1e-9)
     assert np.all(q <= ARM.q_max + 1e-9)
@@ -85,15 +85,15 @@ def _scan(poses_id: int) -> np.ndarray:
     return poses.scan(161, 121)
 
 
-def dense_scan(starts: LineStarts | ApertureStarts) -> InitialConditions:
+def dense_scan(starts: LineStarts | ApertureStarts) -> Starts:
     """Possible initial conditions 5 mm and 1.5 degrees (0.75 at apertures) apart."""
     poses = _scan(id(starts.poses))
     if isinstance(starts, LineStarts):
-        return InitialConditions(poses, np.zeros((len(poses), 2)))
-    x0, p_WR = [], []
+        return Starts(poses, np.zeros((len(poses), 3)))
+    x0, b0 = [], []
     for p_WA in starts.p_WA:
         base = p_WA[:2] - poses[:, :2]
         on_track = (base[:, 1] >= starts.track.y_min_m) & (base[:, 1] <= starts.track.y_max_m)
         x0.append(poses[on_track] + np.column_stack([base, np.zeros(len(base))])[on_track])
-        p_WR.append(base[on_track])
-    return InitialConditions(np.vstack(x0), np.vstack(p_WR))
+        b0.append(np.column_stack([base, np.zeros(len(base))])[on_track])
+    return Starts(np.vstack(x0), np.vstack(b0))
