@@ -1,7 +1,9 @@
-"""A table of texts, written as Markdown or LaTeX."""
+"""A table of texts, written as Markdown or LaTeX, and the cells that show a success rate."""
 
 import re
 from dataclasses import dataclass
+
+from lic_drake.evaluate.statistics import Count
 
 _ESCAPES = str.maketrans({"&": r"\&", "%": r"\%", "_": r"\_", "#": r"\#", "$": r"\$"})
 
@@ -60,6 +62,20 @@ class Table:
 
     def _repr_markdown_(self) -> str:
         return self.to_markdown()
+
+
+def rate_cells(result: Count, digits: int = 1) -> tuple[str, str, str]:
+    """Returns a success rate and its Wilson 90 % interval in percent, and the counts, as text.
+
+    Args:
+        result: Successes and trials; without trials rate and interval are a dash.
+        digits: Decimals of the rate.
+    """
+    counts = f"{result.successes}/{result.trials}"
+    if result.trials == 0:
+        return "-", "-", counts
+    low, high = result.interval()
+    return f"{100 * result.rate:.{digits}f}", f"{100 * low:.1f}..{100 * high:.1f}", counts
 
 
 def latex_text(text: str) -> str:

@@ -12,7 +12,7 @@ from lic_drake.evaluate.statistics import (
     paired_difference,
     two_sample_t_test,
 )
-from lic_drake.evaluate.table import Table
+from lic_drake.evaluate.table import Table, rate_cells
 from lic_drake.evaluate.trials import TrialTable
 
 BASELINES = ("rnd", "cost")
@@ -172,14 +172,8 @@ def _paper_margin(paper: PaperTable, method: str, other: str, part: str) -> str:
 
 
 def _cells(result: Count) -> tuple[str, str]:
-    """Formats a rate with its counts, and its interval, percent."""
-    if result.trials == 0:
-        return f"- ({result.successes}/{result.trials})", "-"
-    low, high = result.interval()
-    return (
-        f"{100.0 * result.rate:.2f} ({result.successes}/{result.trials})",
-        f"{100.0 * low:.1f}..{100.0 * high:.1f}",
-    )
+    rate, interval, counts = rate_cells(result, digits=2)
+    return f"{rate} ({counts})", interval
 
 
 def _points(difference: Difference) -> tuple[str, str]:

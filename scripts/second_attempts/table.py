@@ -1,16 +1,15 @@
-"""Tabulates second attempts after failures of LIC-1, LIC-2 beside other choices.
+"""Tabulates second attempts after failures of LIC-1: LIC-2 beside other choices.
 
 python scripts/second_attempts/table.py
 """
 
-import sys
 from pathlib import Path
 
 from lic_drake.evaluate.paper import TABLES
 from lic_drake.evaluate.statistics import count, mcnemar
-from lic_drake.evaluate.table import Table
+from lic_drake.evaluate.table import Table, rate_cells
 from lic_drake.evaluate.trials import TrialTable
-from scripts.common import load_trials, run_script, write_table_files
+from scripts.common import load_trials, run_tables, write_tables
 
 NAMES = {
     "": "LIC-2",
@@ -38,9 +37,6 @@ def second_attempts_table(trials: TrialTable, category: str, estimator: str) -> 
         trials: Trials of two attempts.
         category: Clutter category.
         estimator: "gp" or "knn".
-
-    Raises:
-        LibraryError: There are no trials of LIC with this estimator.
     """
     failed = ~trials.success(estimator, 1)
     paper = trials.success(estimator, 2)[failed]
@@ -52,27 +48,12 @@ def second_attempts_table(trials: TrialTable, category: str, estimator: str) -> 
             if method not in trials.methods(variant):
                 continue
             won = trials.success(method, 2, variant)[failed]
-            result = count(won)
-            low, high = result.interval()
             p = "" if (variant, suffix) == ("", "") else f"{mcnemar(won, paper):.2g}"
-            rows.append(
-                (
-                    name,
-                    environment,
-                    f"{100 * result.rate:.1f}",
-                    f"{100 * low:.1f}..{100 * high:.1f}",
-                    f"{result.successes}/{result.trials}",
-                    p,
-                )
-            )
+            rows.append((name, environment, *rate_cells(count(won)), p))
     return Table(
         caption=f"Second attempts in {category} after failures of LIC-1 ({estimator}).",
         heading=(
-            "second choice",
-            "environment",
-            "success, %",
-            "Wilson 90 % interval",
-            "count",
+            *("second choice", "environment", "success, %", "Wilson 90 % interval", "count"),
             "McNemar's p against LIC-2",
         ),
         rows=tuple(rows),
@@ -80,13 +61,14 @@ def second_attempts_table(trials: TrialTable, category: str, estimator: str) -> 
 
 
 def write(results: Path) -> list[Path]:
+    """Writes a table for each category and estimator."""
     tables = [
         second_attempts_table(load_trials(results, category), category, estimator)
         for category in TABLES
         for estimator in ("gp", "knn")
     ]
-    return write_table_files(results, "second_attempts", tables)
+    return write_tables(results, "second_attempts", tables)
 
 
 if __name__ == "__main__":
-    sys.exit(run_script(write, __doc__))
+    run_tables(write, __doc__)

@@ -4,9 +4,7 @@ python scripts/tables/figures.py
 python scripts/tables/figures.py success_cylinder-clutter learning_curve
 """
 
-import argparse
 import csv
-import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -14,32 +12,27 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from lic_drake.errors import LibraryError, LicError
+from lic_drake.errors import LibraryError
 from lic_drake.estimate.cross_validation import CalibrationBin, calibration_curve
-from lic_drake.evaluate.figures import (
-    AttemptCounts,
-    draw_calibration,
-    draw_success_bars,
-    draw_success_by_attempts,
-    draw_success_by_goal,
-)
 from lic_drake.evaluate.paper import TABLES, label
 from lic_drake.evaluate.statistics import count
 from lic_drake.evaluate.tables import LEARNED, METHODS
 from lic_drake.evaluate.trials import TrialTable
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.show.plots import save_figure
-from scripts.common import RESULTS, load_trials
-from scripts.learning_curve.curve import draw_learning_curve, read_learning_curves
-
-LEARNING_CURVE = Path("learning_curve/learning_curve.csv")
-"""As scripts/learning_curve/run.py writes it; below the folder of all records."""
+from scripts.common import add_results, load_trials, make_parser, run_script
+from scripts.learning_curve.run import LearningPoint
+from scripts.tables.drawing import (
+    AttemptCounts,
+    draw_calibration,
+    draw_learning_curve,
+    draw_success_bars,
+    draw_success_by_attempts,
+    draw_success_by_goal,
+)
 
 FIVE_ATTEMPTS = "five-attempts"
 """Variant of the trials that go on to a fifth attempt."""
-
-HELD_OUT_CALIBRATION = Path("cross_validation/calibration_curves.csv")
-"""As scripts/cross_validation/run.py writes it; below the folder of all records."""
 
 
 def success_figure(results: Path, category: str) -> Figure:
@@ -101,7 +94,13 @@ def calibration_figure(results: Path, category: str) -> Figure:
 
 def held_out_calibration_figure(results: Path) -> Figure:
     """Returns observed against predicted success in environments of the library held out."""
-    curves = _read_calibration(results / HELD_OUT_CALIBRATION)
+    path = results / "cross_validation" / "calibration_curves.csv"
+    curves: dict[str, list[CalibrationBin]] = {name: [] for name in LEARNED}
+    for row in _read_csv(path, "scripts/cross_validation/run.py"):
+        if (name := row.pop("estimator")) in curves:
+            size = int(row.pop("count"))
+            numbers = {key: float(value) for key, value in row.items()}
+            curves[name].append(CalibrationBin(count=size, **numbers))
     figure = Figure(figsize=(4.5, 4.5))
     draw_calibration(figure.subplots(), curves).set_title("held-out environments", fontsize=10)
     return figure
@@ -124,7 +123,12 @@ def goals_figure(results: Path, category: str) -> Figure:
 
 def learning_figure(results: Path) -> Figure:
     """Returns success of the selected start against the size of the library."""
-    curves = read_learning_curves(results / LEARNING_CURVE)
+    path = results / "learning_curve" / "learning_curve.csv"
+    curves: dict[str, list[LearningPoint]] = {}
+    for row in _read_csv(path, "scripts/learning_curve/run.py"):
+        name, size = row.pop("estimator"), int(row.pop("size"))
+        numbers = {key: float(value) for key, value in row.items()}
+        curves.setdefault(name, []).append(LearningPoint(estimator=name, size=size, **numbers))
     figure = Figure(figsize=(5.5, 4.0))
     draw_learning_curve(figure.subplots(), curves, "success of the selected start")
     return figure
@@ -165,53 +169,29 @@ def _selected_calibration(trials: TrialTable, method: str, attempt: int) -> list
     return calibration_curve(probability, np.array([float(row.success) for row in rows]))
 
 
-def _read_calibration(path: Path) -> dict[str, list[CalibrationBin]]:
-    """Reads the curves of LIC's estimators."""
-    curves: dict[str, list[CalibrationBin]] = {name: [] for name in LEARNED}
-    try:
-        with path.open(newline="", encoding="utf-8") as file:
-            for row in csv.DictReader(file):
-                if row["estimator"] in curves:
-                    curves[row["estimator"]].append(
-                        CalibrationBin(
-                            low=float(row["low"]),
-                            high=float(row["high"]),
-                            count=int(row["count"]),
-                            predicted=float(row["predicted"]),
-                            observed=float(row["observed"]),
-                        )
-                    )
-    except FileNotFoundError:
-        raise LibraryError(
-            f"no calibration curves at {path}; make them with: python"
-            f" scripts/cross_validation/run.py models/experience/cylinder-clutter"
-            f" --out {path.parent}"
-        ) from None
-    except (OSError, ValueError, KeyError, TypeError, csv.Error) as error:
-        raise LibraryError(f"{path} has no calibration curves ({error}); make it again") from None
-    return curves
+def _read_csv(path: Path, script: str) -> list[dict[str, str]]:
+    """Returns the rows of a file that another script writes."""
+    if not path.exists():
+        raise LibraryError(f"there is no {path}; make it with: python {script}")
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("names", nargs="*", choices=list(FIGURES), help="default: all of them")
-    parser.add_argument("--results", type=Path, default=RESULTS, help="folder of all records")
+def main() -> None:
+    parser = make_parser(__doc__)
+    parser.add_argument("names", nargs="*", metavar="FIGURE", help=f"one of {', '.join(FIGURES)}")
+    add_results(parser)
     args = parser.parse_args()
+    if unknown := set(args.names) - set(FIGURES):
+        parser.error(f"unknown figures: {', '.join(sorted(unknown))}")
     folder = args.results / "figures"
-    failed = False
+    folder.mkdir(parents=True, exist_ok=True)
     for name in args.names or FIGURES:
-        try:
-            figure = FIGURES[name](args.results)
-            folder.mkdir(parents=True, exist_ok=True)
-            for suffix in (".png", ".pdf"):
-                save_figure(figure, folder / f"{name}{suffix}")
-        except LicError as error:
-            print(f"error: {error}", file=sys.stderr)
-            failed = True
-        else:
-            print(folder / f"{name}.png")
-    return 2 if failed else 0
+        figure = FIGURES[name](args.results)
+        for suffix in (".png", ".pdf"):
+            save_figure(figure, folder / f"{name}{suffix}")
+        print(folder / f"{name}.png")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_script(main)

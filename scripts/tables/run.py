@@ -3,25 +3,154 @@
 python scripts/tables/run.py
 """
 
-import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from lic_drake.evaluate.trials import TrialTable, read_trials
+import numpy as np
+
+from lic_drake.evaluate.paper import TABLES, label
+from lic_drake.evaluate.statistics import count, mcnemar
+from lic_drake.evaluate.table import Table, rate_cells
+from lic_drake.evaluate.tables import METHODS, margins_table, success_table, t_test_table
+from lic_drake.evaluate.trials import TrialTable
 from lic_drake.experience.store import ExperienceLibrary
-from scripts.common import run_script, write_table_files, write_tables
-from scripts.tables.foliage import foliage_table
-from scripts.tables.pr2 import oracle_table, space_table
+from lic_drake.types import BoolVector
+from scripts.common import load_trials, run_tables, write_tables
+
+NUMBERS = {
+    "cylinder-clutter": 1,
+    "passage-clutter": 3,
+    "cylinder-aperture-clutter": 4,
+}
+"""The paper's tables of success by category; Table II is of the first category, too."""
+
+PARTS = (("1st attempt", 1), ("total of two", 2))
+RATE_HEADS = ("success, %", "90 % interval", "count")
+SUCCESS_HEADS = (*RATE_HEADS, "p against RND", "p against COST")
+
+
+def pr2_table(trials: TrialTable) -> Table:
+    """Returns the PR2's success before spheres, which the paper only demonstrates (V-B).
+
+    Args:
+        trials: Trials of two attempts, with the variant "still" where base and torso stay.
+    """
+    rows: list[tuple[str, ...] | None] = []
+    for variant, stand in (("", "move along the board"), ("still", "stay")):
+        methods = [m for m in METHODS if m in trials.methods(variant)]
+        rows += success_rows(trials, stand, [(label(m), m, variant) for m in methods])
+    return Table(
+        caption="The PR2 in sphere-aperture-clutter with 10 of 20 apertures blocked: unseen"
+        " environments with a random goal each, the same for all strategies. Intervals are"
+        " Wilson's, 90 %; p is McNemar's exact paired test.",
+        heading=("base and torso", "attempt", "strategy", *SUCCESS_HEADS),
+        rows=tuple(rows[1:]),
+    )
+
+
+def oracle_table(trials: TrialTable, every: ExperienceLibrary) -> Table:
+    """Returns what could be attained from where the robot stands, beside the strategies.
+
+    Args:
+        trials: Trials with the variant "still", one goal in each environment.
+        every: Reaches through every open aperture in the first of these environments.
+    """
+    columns = every.columns()
+    environments = np.unique(columns["environment"])
+    succeeded = np.unique(columns["environment"][columns["success"].astype(bool)])
+    oracle = np.isin(environments, succeeded)
+    rows = [("", "oracle: any open aperture", *rate_cells(count(oracle)))]
+    methods = [m for m in METHODS if m in trials.methods("still")]
+    for part, attempts in PARTS:
+        won = [trials.success(m, attempts, "still")[: len(environments)] for m in methods]
+        rows += [(part, label(m), *rate_cells(count(w))) for m, w in zip(methods, won, strict=True)]
+    any_of_them = count(np.any(won, axis=0))
+    rows.append(("total of two", "any of the strategies", *rate_cells(any_of_them)))
+    return Table(
+        caption=f"The PR2 stays; the first {len(environments)} of these environments.",
+        heading=("attempt", "strategy", *RATE_HEADS),
+        rows=tuple(rows),
+    )
+
+
+def foliage_table(trials: TrialTable) -> Table:
+    """Returns the PR2's success before foliage, which the paper demonstrates once (V-B).
+
+    Args:
+        trials: Trials of two attempts by variant: what is known, and where it was learned.
+    """
+    rows: list[tuple[str, ...] | None] = []
+    for known, words in (("cameras", "seen by cameras"), ("known", "known")):
+        strategies = [
+            (f"{label(method)}{learned if method not in ('rnd', 'cost') else ''}", method, variant)
+            for variant, learned in ((known, ", spheres"), (f"{known}-foliage", ", foliage"))
+            for method in ("rnd", "cost", "knn", "gp")
+            if method in trials.methods(variant)
+        ]
+        rows += success_rows(trials, words, strategies)
+    return Table(
+        caption="The PR2 before foliage, 8 of 20 apertures covered, 2 of them in part: unseen"
+        " environments with a random goal each, the same for all strategies. Base and torso move."
+        " LIC learned from reaches among spheres or among foliage. With cameras, a reach is a"
+        " success if it ends in the ball. Intervals are Wilson's, 90 %; p is McNemar's exact paired"
+        " test.",
+        heading=("apertures and goal", "attempt", "strategy", *SUCCESS_HEADS),
+        rows=tuple(rows[1:]),
+    )
+
+
+def success_rows(
+    trials: TrialTable, condition: str, strategies: Sequence[tuple[str, str, str]]
+) -> list[tuple[str, ...] | None]:
+    """Returns rows of first attempts and totals of two, a line before each of these parts.
+
+    Args:
+        trials: Trials of two attempts.
+        condition: What the strategies have in common, the first cell.
+        strategies: Name, method and variant of each.
+    """
+    rows: list[tuple[str, ...] | None] = []
+    for part, attempts in PARTS if strategies else ():
+        won = {name: trials.success(method, attempts, v) for name, method, v in strategies}
+        rows.append(None)
+        rows += [(condition, part, name, *success_cells(name, won)) for name in won]
+    return rows
+
+
+def success_cells(name: str, won: Mapping[str, BoolVector]) -> tuple[str, ...]:
+    """Returns the cells of a strategy under `SUCCESS_HEADS`.
+
+    Args:
+        name: The strategy.
+        won: Success of each trial by strategy, each of shape (n,), in the same trials.
+    """
+    against = [
+        f"{mcnemar(won[name], won[other]):.2g}" if other in won and other != name else ""
+        for other in (label("rnd"), label("cost"))
+    ]
+    return (*rate_cells(count(won[name])), *against)
+
+
+def paper_tables(results: Path) -> dict[str, list[Table]]:
+    """Returns the paper's tables with our numbers, and LIC's margins, by file name."""
+    tables = {}
+    for category, number in NUMBERS.items():
+        trials, paper = load_trials(results, category), TABLES[category]
+        tables[f"table_{number}"] = [success_table(trials, paper), margins_table(trials, paper)]
+        if number == 1:
+            tables["table_2"] = [t_test_table(trials)]
+    return tables
 
 
 def write(results: Path) -> list[Path]:
-    paths = [path for number in (1, 2, 3, 4) for path in write_tables(results, number)]
-    trials = TrialTable(read_trials(results / "sphere-aperture-clutter" / "trials.parquet"))
+    """Writes all tables."""
+    tables = paper_tables(results)
+    spheres = load_trials(results, "sphere-aperture-clutter")
     every = ExperienceLibrary(results / "bounds" / "sphere-aperture-clutter" / "factorial")
-    tables = [space_table(trials), oracle_table(trials, every.columns())]
-    paths += write_table_files(results, "table_pr2", tables)
-    trials = TrialTable(read_trials(results / "foliage-aperture-clutter" / "trials.parquet"))
-    return paths + write_table_files(results, "table_foliage", [foliage_table(trials)])
+    tables["table_pr2"] = [pr2_table(spheres), oracle_table(spheres, every)]
+    tables["table_foliage"] = [foliage_table(load_trials(results, "foliage-aperture-clutter"))]
+    return [p for name, parts in tables.items() for p in write_tables(results, name, parts)]
 
 
 if __name__ == "__main__":
-    sys.exit(run_script(write, __doc__))
+    run_tables(write, __doc__)

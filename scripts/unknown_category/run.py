@@ -13,7 +13,7 @@ from pathlib import Path
 from lic_drake.errors import LicError
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
-from scripts.common import RESULTS, write_table_files
+from scripts.common import RESULTS, write_tables
 from scripts.unknown_category.comparison import Comparison, compare, unknown_category_table
 
 CATEGORIES = ("cylinder-clutter", "passage-clutter")
@@ -34,7 +34,7 @@ def main() -> int:
             comparison, range(args.environments), lambda line: print(line, flush=True)
         )
         table = unknown_category_table(rows, beliefs)
-        paths = write_table_files(args.results, "unknown_category", [table])
+        paths = write_tables(args.results, "unknown_category", [table])
     except LicError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

@@ -1,6 +1,6 @@
 """Figures of success rates: functions that take data and an axis, draw, and return the axis.
 
-Every rate is drawn with its Wilson 90 % interval. Density maps and top views: `plots`.
+Every rate is drawn with its Wilson 90 % interval.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,6 +14,7 @@ from lic_drake.estimate.cross_validation import CalibrationBin
 from lic_drake.evaluate.paper import LABELS, label
 from lic_drake.evaluate.statistics import Count
 from lic_drake.types import Vector
+from scripts.learning_curve.run import LearningPoint
 
 COLORS = {"rnd": "tab:gray", "cost": "tab:orange", "gp": "tab:blue", "knn": "tab:green"}
 """Colours of the strategies; others take the next of matplotlib's cycle."""
@@ -70,6 +71,34 @@ def draw_success_bars(
     ax.set_xticks(range(len(methods)), [label(method) for method in methods])
     ax.set(ylim=(0.0, 100.0), ylabel="success [%]")
     ax.set_title("first attempt (dark) and total of two; hatched: paper", fontsize=9)
+    return ax
+
+
+def draw_learning_curve(
+    ax: Axes, curves: Mapping[str, Sequence[LearningPoint]], ylabel: str
+) -> Axes:
+    """Draws scores against the size of the library, on a logarithmic axis.
+
+    Args:
+        ax: Where to draw.
+        curves: Points by estimator.
+        ylabel: What the score is, with its unit.
+    """
+    for i, (name, points) in enumerate(curves.items()):
+        ordered = sorted(points, key=lambda point: point.size)
+        value = np.array([point.value for point in ordered])
+        ends = np.array([[point.low, point.high] for point in ordered]).T
+        ax.errorbar(
+            [point.size for point in ordered],
+            value,
+            yerr=np.abs(ends - value),
+            color=COLORS.get(name),
+            marker=_MARKERS[i % len(_MARKERS)],
+            capsize=3,
+            label=label(name),
+        )
+    ax.set(xscale="log", xlabel="reaches in the library", ylabel=ylabel)
+    ax.legend(fontsize=8)
     return ax
 
 

@@ -6,15 +6,15 @@ from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 
 from lic_drake.estimate.cross_validation import CalibrationBin
-from lic_drake.evaluate.figures import (
+from lic_drake.evaluate.statistics import Count
+from lic_drake.intervals import wilson_interval
+from scripts.tables.drawing import (
     AttemptCounts,
     draw_calibration,
     draw_success_bars,
     draw_success_by_attempts,
     draw_success_by_goal,
 )
-from lic_drake.evaluate.statistics import Count
-from lic_drake.intervals import wilson_interval
 
 OURS = {
     "gp": AttemptCounts(first=Count(70, 100), total=Count(80, 100)),
@@ -66,18 +66,6 @@ def test_success_bars_stand_side_by_side_with_their_intervals(ax: Axes) -> None:
     assert ax.get_ylim() == (0.0, 100.0)
 
 
-def test_the_first_attempt_is_drawn_over_the_total(ax: Axes) -> None:
-    draw_success_bars(ax, {"gp": OURS["gp"]}, {})
-    total, first = ax.patches
-    assert (total.get_height(), first.get_height()) == pytest.approx((80.0, 70.0))
-    assert total.get_alpha() < first.get_alpha()
-
-
-def test_the_papers_strategies_that_we_did_not_try_are_drawn_too(ax: Axes) -> None:
-    draw_success_bars(ax, {}, PAPER)
-    assert len(ax.patches) == 2
-
-
 def test_calibration_shows_observed_against_predicted_with_intervals(ax: Axes) -> None:
     bins = [
         CalibrationBin(low=0.1, high=0.2, count=50, predicted=0.16, observed=0.2),
@@ -108,16 +96,6 @@ def test_the_goal_map_has_rates_and_counts_in_its_cells(ax: Axes) -> None:
     assert texts == {(0.45, -0.35): "1/2", (0.45, 0.05): "1/1", (0.65, 0.15): "0/1"}
     assert (mesh.norm.vmin, mesh.norm.vmax) == (0.0, 100.0)
     assert ax.get_aspect() == 1.0
-
-
-def test_goals_on_an_edge_of_a_cell_belong_to_the_cell_above(ax: Axes) -> None:
-    # Multiples of 0.1 in floating point lie on either side of the edges.
-    goals = np.array([[0.1 * i, 0.3] for i in range(1, 8)])
-    draw_success_by_goal(ax, goals, np.ones(7, dtype=bool))
-    assert sorted(round(t.get_position()[0], 6) for t in ax.texts) == pytest.approx(
-        [0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75]
-    )
-    assert {t.get_text() for t in ax.texts} == {"1/1"}
 
 
 def test_success_grows_with_the_attempts(ax: Axes) -> None:
