@@ -1,11 +1,9 @@
 """Which apertures of the board the PR2's arm can work through, with nothing behind the board.
 
 python scripts/calibration/board.py --board-x 0.5 0.53 0.6 \
-    --out notebooks/results/calibration/board.md
+        --out notebooks/results/calibration/board.md
 """
 
-import argparse
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +11,7 @@ import numpy as np
 from lic_drake.reach.environment import Environment
 from lic_drake.reach.pointing_starts import pointing_starts
 from lic_drake.reach.scenario import load_scenario
+from scripts.common import make_parser, run_script, write_report
 
 OFFSETS = ((0.0, 0.0), (0.1, 0.0), (-0.1, 0.0), (0.0, 0.1), (0.0, -0.1))
 """Goals straight behind an aperture and beside, (y, z), metres."""
@@ -38,8 +37,8 @@ def scan(board_x: float, bar_m: float, depth_m: float) -> tuple[np.ndarray, np.n
     return starts.x0[:, :3], np.array(won)
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def main() -> None:
+    parser = make_parser(__doc__)
     parser.add_argument("--board-x", type=float, nargs="+", default=[0.53], help="metres")
     parser.add_argument("--bar", type=float, default=0.01, help="width of a bar, metres")
     parser.add_argument("--depth", type=float, default=0.31, help="board to goals, metres")
@@ -63,11 +62,8 @@ def main() -> int:
                 here = np.all(np.isclose(p_WA[:, 1:], [y, z], atol=1e-3), axis=1)
                 cells.append(f"{won[here][0]}" if np.any(here) else "-")
             lines.append(f"| {z:.2f} | " + " | ".join(cells) + " |")
-        print("\n".join(lines[-7:]), flush=True)
-    if args.out:
-        args.out.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return 0
+    write_report(args.out, "\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_script(main)

@@ -1,28 +1,25 @@
 """Justifies the integrator and the contact meshes: the same reaches with finer and coarser ones.
 
+    python scripts/convergence/run.py notebooks/results/convergence
+    python scripts/convergence/run.py --scenario sphere-aperture-clutter --reaches 100 OUT
+
 Random starts and goals in calibration environments, for the PR2 starts near the goal; one row a
 variant: success rate, how often the outcome equals the reference's, and cost. Reaches are kept and
 not run again.
-
-    python scripts/convergence/run.py notebooks/results/convergence
-    python scripts/convergence/run.py --scenario sphere-aperture-clutter --reaches 100 OUT
 """
 
-import argparse
-import os
-import sys
 from pathlib import Path
 
 import numpy as np
 
-from lic_drake.evaluate.batch import random_requests, simulate_requests
-from lic_drake.evaluate.statistics import mcnemar
-from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.intervals import wilson_interval
+from lic_drake.evaluate.batch import random_requests
+from lic_drake.evaluate.statistics import count, mcnemar
+from lic_drake.evaluate.table import rate_cells
 from lic_drake.reach.pointing_starts import pointing_starts
-from lic_drake.reach.request import ReachRecord, ReachRequest
+from lic_drake.reach.request import ReachRequest
 from lic_drake.reach.scenario import Scenario, load_scenario
 from lic_drake.seeds import make_generator
+from scripts.common import add_workers, keep_reaches, make_parser, run_script, write_report
 
 PLANAR = {
     "CENIC, up to 10 ms (chosen)": "{}",
@@ -63,33 +60,24 @@ def near_requests(scenario: Scenario, count: int) -> list[ReachRequest]:
     return requests
 
 
-def run_variant(name: str, overrides: str, args: argparse.Namespace) -> list[ReachRecord]:
-    """Returns the records of a variant, in the order of the requests."""
-    scenario = load_scenario(args.scenario, overrides)
-    folder = args.results / "".join(c if c.isalnum() else "-" for c in name).strip("-")
-    library = ExperienceLibrary(folder)
-    library.create()
-    if scenario.arm().surface is None:
-        requests = random_requests(scenario, "calibration", -(-args.reaches // 5), 5)
-    else:
-        requests = near_requests(scenario, args.reaches)
-    requests = requests[: args.reaches]
-    records = simulate_requests(
-        requests, library, scenario, args.workers, lambda line: print(f"{name}: {line}")
-    )
-    return [records[request.key] for request in requests]
-
-
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def main() -> None:
+    parser = make_parser(__doc__)
     parser.add_argument("results", type=Path, help="folder for reaches and convergence.md")
     parser.add_argument("--scenario", default="cylinder-clutter")
     parser.add_argument("--reaches", type=int, default=200)
-    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    add_workers(parser)
     args = parser.parse_args()
-    variants = PLANAR if load_scenario(args.scenario).arm().surface is None else IN_SPACE
-    rows = {name: run_variant(name, overrides, args) for name, overrides in variants.items()}
-    last = list(variants)[-1]
+    in_plane = load_scenario(args.scenario).arm().surface is None
+    rows = {}
+    for name, overrides in (PLANAR if in_plane else IN_SPACE).items():
+        scenario = load_scenario(args.scenario, overrides)
+        if in_plane:
+            requests = random_requests(scenario, "calibration", -(-args.reaches // 5), 5)
+        else:
+            requests = near_requests(scenario, args.reaches)
+        folder = args.results / "".join(c if c.isalnum() else "-" for c in name).strip("-")
+        rows[name] = keep_reaches(requests[: args.reaches], folder, scenario, args.workers)
+    last = list(rows)[-1]
     reference = np.array([record.success for record in rows[last]])
     lines = [
         f"| variant | success, % | 90 % interval | n | same outcome as {last}, % | McNemar p |"
@@ -98,18 +86,14 @@ def main() -> int:
     ]
     for name, records in rows.items():
         won = np.array([record.success for record in records])
-        low, high = wilson_interval(int(won.sum()), len(won))
+        rate, interval, _ = rate_cells(count(won))
         cost = sum(r.wall_time_s for r in records) / sum(r.duration_s for r in records)
         lines.append(
-            f"| {name} | {100 * won.mean():.1f} | {100 * low:.1f}..{100 * high:.1f} | {len(won)} |"
-            f" {100 * np.mean(won == reference):.1f} | {mcnemar(won, reference):.2f} |"
-            f" {cost:.3f} |"
+            f"| {name} | {rate} | {interval} | {len(won)} | {100 * np.mean(won == reference):.1f}"
+            f" | {mcnemar(won, reference):.2f} | {cost:.3f} |"
         )
-    text = "\n".join(lines) + "\n"
-    (args.results / "convergence.md").write_text(text, encoding="utf-8")
-    print(text, end="")
-    return 0
+    write_report(args.results / "convergence.md", "\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_script(main)

@@ -3,9 +3,7 @@
 python scripts/cross_validation/run.py models/experience/cylinder-clutter --out notebooks/results
 """
 
-import argparse
 import csv
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import asdict, replace
@@ -13,7 +11,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from lic_drake.errors import LicError
 from lic_drake.estimate.cross_validation import (
     calibration_curve,
     hold_out_environments,
@@ -24,6 +21,7 @@ from lic_drake.estimate.features import PLANAR_LIC1
 from lic_drake.estimate.registry import estimator_names, make_estimator
 from lic_drake.estimate.scikit_learn import PEERS
 from lic_drake.experience.store import ExperienceLibrary
+from scripts.common import RESULTS, make_parser, run_script
 
 ESTIMATORS: dict[str, Callable[[], Predictor]] = {
     **{name: partial(make_estimator, name) for name in estimator_names()},
@@ -86,20 +84,15 @@ def run(library: Path, names: list[str], folds: int, out: Path) -> None:
     )
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def main() -> None:
+    parser = make_parser(__doc__)
     parser.add_argument("library", type=Path, help="folder or Parquet file of an LIC-1 library")
     parser.add_argument("--estimators", nargs="+", choices=ESTIMATORS, default=list(ESTIMATORS))
     parser.add_argument("--folds", type=int, default=10, help="groups of environments held out")
-    parser.add_argument("--out", type=Path, default=Path("notebooks/results/estimators"))
+    parser.add_argument("--out", type=Path, default=RESULTS / "cross_validation")
     args = parser.parse_args()
-    try:
-        run(args.library, args.estimators, args.folds, args.out)
-    except LicError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    return 0
+    run(args.library, args.estimators, args.folds, args.out)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_script(main)

@@ -5,8 +5,6 @@
 Writes head.png and external.png, without noise, and detections.jpg, with it.
 """
 
-import argparse
-import sys
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -22,10 +20,11 @@ from lic_drake.reach.scenario import load_scenario
 from lic_drake.seeds import make_generator
 from lic_drake.show.drawing import draw_apertures, draw_goal
 from lic_drake.show.plots import save_figure
+from scripts.common import make_parser, run_script
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def main() -> None:
+    parser = make_parser(__doc__)
     parser.add_argument("results", type=Path, help="folder for the pictures")
     parser.add_argument(
         "--scene", type=int, default=0, help="environment of the calibration stream"
@@ -48,8 +47,7 @@ def main() -> int:
     draw_apertures(left, views.head, apertures).set_title("probability of being open", fontsize=9)
     draw_goal(right, views.external, goal, cameras.ball_radius_m)
     save_figure(figure, args.results / "detections.jpg")
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_script(main)

@@ -1,6 +1,7 @@
 """How far perception is off, and how often it is wrong, in random scenes (paper V-B)."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -109,60 +110,53 @@ def _aperture_errors(
 ) -> list[ApertureError]:
     board, model = board_of(scenario)
     truth = true_states(board, instance)
-    try:
+    states, probability = ("unseen",) * len(truth), np.full(len(truth), 0.5)
+    error = chi_squared = np.full(len(truth), np.nan)
+    with suppress(PerceptionError):
         found = find_apertures(views.head, cameras.head.camera, model)
-    except PerceptionError:
-        return [
-            ApertureError(
-                scene=scene,
-                noise=noise,
-                aperture=i,
-                truth=state,
-                state="unseen",
-                probability_open=0.5,
-                error_m=np.nan,
-                chi_squared=np.nan,
-            )
-            for i, state in enumerate(truth)
-        ]
-    off = found.p_WA - board.aperture_centres()
+        states, probability = found.states, found.probability_open
+        off = found.p_WA - board.aperture_centres()
+        error = np.linalg.norm(off, axis=1)
+        chi_squared = np.array(
+            [e @ np.linalg.solve(C, e) for e, C in zip(off, found.covariance, strict=True)]
+        )
     return [
         ApertureError(
             scene=scene,
             noise=noise,
             aperture=i,
             truth=truth[i],
-            state=found.states[i],
-            probability_open=float(found.probability_open[i]),
-            error_m=float(np.linalg.norm(off[i])),
-            chi_squared=float(off[i] @ np.linalg.solve(found.covariance[i], off[i])),
+            state=states[i],
+            probability_open=float(probability[i]),
+            error_m=float(error[i]),
+            chi_squared=float(chi_squared[i]),
         )
-        for i in range(len(off))
+        for i in range(len(truth))
     ]
 
 
 def _goal_error(
     p_WG: Vector, cameras: CamerasConfig, views: Views, scene: int, noise: bool
 ) -> GoalError:
-    try:
+    error = chi_squared = np.nan
+    with suppress(PerceptionError):
         found = find_goal(views.external, cameras.external.camera, cameras.ball_radius_m)
-    except PerceptionError:
-        return GoalError(scene=scene, noise=noise, error_m=np.nan, chi_squared=np.nan)
-    off = found.p_WG - p_WG
-    return GoalError(
-        scene=scene,
-        noise=noise,
-        error_m=float(np.linalg.norm(off)),
-        chi_squared=float(off @ np.linalg.solve(found.covariance, off)),
-    )
+        off = found.p_WG - p_WG
+        error = float(np.linalg.norm(off))
+        chi_squared = float(off @ np.linalg.solve(found.covariance, off))
+    return GoalError(scene=scene, noise=noise, error_m=error, chi_squared=chi_squared)
 
 
 def perception_report(apertures: Sequence[ApertureError], goals: Sequence[GoalError]) -> str:
     """Returns the errors as Markdown tables."""
+    exact, noisy = (
+        _figures([a for a in apertures if a.noise == noise], [g for g in goals if g.noise == noise])
+        for noise in (False, True)
+    )
     lines = [
         "| | exact images | with the cameras' errors |",
         "|---|---|---|",
-        *(_row(name, figure, apertures, goals) for name, figure in _FIGURES.items()),
+        *(f"| {name} | {exact[name]} | {noisy[name]} |" for name in exact),
     ]
     for noise, title in ((False, "exact images"), (True, "with the cameras' errors")):
         lines += ["", f"Apertures, {title} (rows: what they are; columns: what was found)", ""]
@@ -173,17 +167,20 @@ def perception_report(apertures: Sequence[ApertureError], goals: Sequence[GoalEr
     return "\n".join(lines) + "\n"
 
 
-_Figure = Callable[[Sequence[ApertureError], Sequence[GoalError]], str]
-
-
-def _row(
-    name: str, figure: _Figure, apertures: Sequence[ApertureError], goals: Sequence[GoalError]
-) -> str:
-    cells = [
-        figure([a for a in apertures if a.noise == noise], [g for g in goals if g.noise == noise])
-        for noise in (False, True)
-    ]
-    return f"| {name} | {' | '.join(cells)} |"
+def _figures(apertures: Sequence[ApertureError], goals: Sequence[GoalError]) -> dict[str, str]:
+    """Returns the figures of one column of the report by name."""
+    right = sum((a.truth == "open") == (a.state == "open") for a in apertures)
+    low, high = wilson_interval(right, len(apertures))
+    off = [a.probability_open - (a.truth == "open") for a in apertures]
+    return {
+        "aperture's centre: median error, 95 %": _distances(apertures),
+        "goal: median error, 95 %": _distances(goals),
+        "open or not: right (90 % interval)": f"{100 * right / len(apertures):.2f} % of"
+        f" {len(apertures)} ({100 * low:.2f}..{100 * high:.2f})",
+        "probability of being open: Brier score": f"{np.mean(np.square(off)):.4f}",
+        "mean squared error by covariance, apertures (3)": _spread(apertures),
+        "mean squared error by covariance, goals (3)": _spread(goals),
+    }
 
 
 def _distances(errors: Sequence[ApertureError | GoalError]) -> str:
@@ -198,27 +195,3 @@ def _distances(errors: Sequence[ApertureError | GoalError]) -> str:
 def _spread(errors: Sequence[ApertureError | GoalError]) -> str:
     values = np.array([e.chi_squared for e in errors])
     return f"{np.nanmean(values):.2f}" if np.any(np.isfinite(values)) else "none"
-
-
-def _right(apertures: Sequence[ApertureError]) -> str:
-    right = sum((a.truth == "open") == (a.state == "open") for a in apertures)
-    low, high = wilson_interval(right, len(apertures))
-    return (
-        f"{100 * right / len(apertures):.2f} % of {len(apertures)}"
-        f" ({100 * low:.2f}..{100 * high:.2f})"
-    )
-
-
-def _brier(apertures: Sequence[ApertureError]) -> str:
-    off = [a.probability_open - (a.truth == "open") for a in apertures]
-    return f"{np.mean(np.square(off)):.4f}"
-
-
-_FIGURES: dict[str, _Figure] = {
-    "aperture's centre: median error, 95 %": lambda apertures, _: _distances(apertures),
-    "goal: median error, 95 %": lambda _, goals: _distances(goals),
-    "open or not: right (90 % interval)": lambda apertures, _: _right(apertures),
-    "probability of being open: Brier score": lambda apertures, _: _brier(apertures),
-    "mean squared error by covariance, apertures (3)": lambda apertures, _: _spread(apertures),
-    "mean squared error by covariance, goals (3)": lambda _, goals: _spread(goals),
-}

@@ -6,8 +6,6 @@ Writes perception.md, apertures.parquet and goals.parquet; what is there already
 again. The scenes are environments of the evaluation stream; nothing was tried out on them.
 """
 
-import argparse
-import sys
 from dataclasses import asdict
 from pathlib import Path
 
@@ -17,6 +15,7 @@ from tqdm import tqdm
 
 from lic_drake.perception.config import CamerasConfig, load_cameras
 from lic_drake.reach.scenario import Scenario, load_scenario
+from scripts.common import make_parser, run_script
 from scripts.perception.errors import (
     ApertureError,
     GoalError,
@@ -59,15 +58,13 @@ def load[Row: (ApertureError, GoalError)](path: Path, kind: type[Row]) -> list[R
     return [kind(**row) for row in pq.read_table(path).to_pylist()] if path.is_file() else []
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def main() -> None:
+    parser = make_parser(__doc__)
     parser.add_argument("results", type=Path, help="folder for the results")
     parser.add_argument("--scenario", default="foliage-aperture-clutter")
     parser.add_argument("--cameras", default="foliage")
     parser.add_argument("--scenes", type=int, default=200)
     args = parser.parse_args()
-    if args.scenes < 1:
-        parser.error(f"--scenes must be at least 1, got {args.scenes}")
     scenario, cameras = load_scenario(args.scenario), load_cameras(args.cameras)
     apertures = load(args.results / "apertures.parquet", ApertureError)
     goals = load(args.results / "goals.parquet", GoalError)
@@ -79,8 +76,7 @@ def main() -> int:
         if (scene + 1) % SAVE_EVERY == 0 or scene + 1 == args.scenes:
             text = save(args.results, scenario, cameras, apertures, goals)
     print(text, end="")
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_script(main)

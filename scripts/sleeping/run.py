@@ -1,25 +1,19 @@
 """Compares reaches in which untouched objects sleep with the same reaches with all of them awake.
 
+    python scripts/sleeping/run.py out/sleeping --report notebooks/results/sleeping.md
+
 Random starts and goals in calibration environments. Prints and writes how many outcomes differ and
 how far the figures of the records are apart. Reaches are kept and not run again.
-
-    python scripts/sleeping/run.py out/sleeping --report notebooks/results/sleeping.md
 """
 
-import argparse
-import os
-import sys
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from lic_drake.evaluate.batch import random_requests, simulate_requests
+from lic_drake.evaluate.batch import random_requests
 from lic_drake.evaluate.statistics import mcnemar
-from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.reach.request import ReachRecord
-from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import load_scenario
+from scripts.common import add_workers, keep_reaches, make_parser, run_script, write_report
 
 FIGURES = ("final_x", "final_y", "final_phi", "min_distance", "peak_force", "duration_s")
 
@@ -27,32 +21,19 @@ TIGHT = 1e-9
 """Two records agree closely when their final poses do, to this (metres, radians)."""
 
 
-def run(name: str, sleep: bool, args: argparse.Namespace) -> list[ReachRecord]:
-    """Returns the records in the order of the requests."""
-    scenario = load_scenario("cylinder-clutter")
-    library = ExperienceLibrary(args.reaches / name)
-    library.create()
-    requests = random_requests(scenario, "calibration", -(-args.count // 5), 5)[: args.count]
-    records = simulate_requests(
-        requests,
-        library,
-        scenario,
-        args.workers,
-        lambda line: print(f"{name}: {line}", flush=True),
-        partial(run_reach, sleep=sleep),
-    )
-    return [records[request.key] for request in requests]
-
-
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def main() -> None:
+    parser = make_parser(__doc__)
     parser.add_argument("reaches", type=Path, help="folder for the reaches")
     parser.add_argument("--report", type=Path, help="Markdown file")
     parser.add_argument("--count", type=int, default=1000)
-    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    add_workers(parser)
     args = parser.parse_args()
-    asleep, awake = run("asleep", True, args), run("awake", False, args)
-
+    scenario = load_scenario("cylinder-clutter")
+    requests = random_requests(scenario, "calibration", -(-args.count // 5), 5)[: args.count]
+    asleep, awake = (
+        keep_reaches(requests, args.reaches / name, scenario, args.workers, sleep=sleep)
+        for name, sleep in (("asleep", True), ("awake", False))
+    )
     pairs = [
         (a, b) for a, b in zip(asleep, awake, strict=True) if a.duration_s > 0.0 < b.duration_s
     ]
@@ -75,12 +56,8 @@ def main() -> int:
             for name, d in zip(FIGURES, apart.T, strict=True)
         ),
     ]
-    text = "\n".join(lines) + "\n"
-    print(text, end="")
-    if args.report:
-        args.report.write_text(text, encoding="utf-8")
-    return 0
+    write_report(args.report, "\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_script(main)

@@ -5,11 +5,6 @@ Takes the first recorded trial whose first attempt failed and whose second succe
 python scripts/tables/figures_5_and_6.py
 """
 
-import argparse
-import sys
-from pathlib import Path
-
-from lic_drake.errors import LicError
 from lic_drake.evaluate.trial import run_trial
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
@@ -18,22 +13,18 @@ from lic_drake.select.lic import LicSelector
 from lic_drake.select.registry import make_selector
 from lic_drake.show.attempt_figures import densities_figure, snapshots_figure
 from lic_drake.show.plots import save_figure
-from scripts.common import RESULTS, load_trials
+from scripts.common import add_results, load_trials, make_parser, run_script
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def main() -> None:
+    parser = make_parser(__doc__)
     parser.add_argument("--category", default="cylinder-clutter")
     parser.add_argument("--method", default="gp")
-    parser.add_argument("--results", type=Path, default=RESULTS, help="folder of all records")
+    add_results(parser)
     args = parser.parse_args()
-    try:
-        trials = load_trials(args.results, args.category).trials(args.method)
-        library = ExperienceLibrary(shipped_library(args.category))
-        scenario = library.scenario()
-    except LicError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
+    trials = load_trials(args.results, args.category).trials(args.method)
+    library = ExperienceLibrary(shipped_library(args.category))
+    scenario = library.scenario()
     environment, goal = next(
         pair for pair, rows in trials.items() if len(rows) == 2 and rows[1].success
     )
@@ -45,15 +36,10 @@ def main() -> int:
     starts = make_starts(scenario, scenario.sample_instance("evaluation", environment))
     folder = args.results / "figures"
     folder.mkdir(parents=True, exist_ok=True)
-    for name, figure in (
-        ("figure_5", snapshots_figure(attempts)),
-        ("figure_6", densities_figure(selector, starts, p_WG, attempts)),
-    ):
-        path = folder / f"{name}_{args.category}.png"
-        save_figure(figure, path)
-        print(path)
-    return 0
+    save_figure(snapshots_figure(attempts), folder / f"figure_5_{args.category}.png")
+    density = densities_figure(selector, starts, p_WG, attempts)
+    save_figure(density, folder / f"figure_6_{args.category}.png")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_script(main)

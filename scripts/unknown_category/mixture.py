@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lic_drake.errors import RequestError
 from lic_drake.reach.start import Starts
 from lic_drake.robots.planar import PlanarArm
 from lic_drake.select.objective import SuccessObjective
@@ -31,23 +30,7 @@ def posterior(prior: Vector, log_likelihood: Vector) -> Vector:
     with np.errstate(divide="ignore"):  # A category of no probability keeps it.
         score = np.log(prior) + log_likelihood
     weight = np.exp(score - score.max())
-    normalised: Vector = weight / weight.sum()
-    return normalised
-
-
-def check_distribution(probability: Mapping[str, float]) -> Vector:
-    """Returns the probabilities of categories, shape (k,).
-
-    Raises:
-        RequestError: There is none, one is negative, or they do not add up to 1.
-    """
-    prior = np.array(list(probability.values()))
-    if not len(prior) or np.any(prior < 0.0) or not np.isclose(prior.sum(), 1.0, atol=1e-6):
-        raise RequestError(
-            "the probabilities of the categories must be 0 or more and add up to 1, got"
-            f" {dict(probability)}; divide them by their sum"
-        )
-    return prior
+    return np.asarray(weight / weight.sum())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,8 +52,7 @@ class MixtureObjective:
 
     def values(self, conditions: Starts) -> Vector:
         """Returns the estimates at n initial conditions, shape (n,); see `SuccessObjective`."""
-        values: Vector = self.weight @ [part.values(conditions) for part in self.parts]
-        return values
+        return np.asarray(self.weight @ [part.values(conditions) for part in self.parts])
 
     def value_and_gradient(self, x0: Vector, b0: Vector) -> tuple[float, Vector, Vector]:
         """Returns the estimate and its gradients by x0 and b0; see `SuccessObjective`."""
@@ -102,35 +84,18 @@ class MixtureLic(PlanarLic):
     the optimisation moves between them.
 
     Attributes:
-        categories: The categories by name.
+        categories: The categories by name; their probabilities add up to 1.
         updates: Whether failures change what is believed.
     """
 
     def __init__(
-        self,
-        arm: PlanarArm,
-        categories: Mapping[str, Category],
-        *,
-        updates: bool = True,
-        method: str = "mixture",
+        self, arm: PlanarArm, categories: Mapping[str, Category], *, updates: bool = True
     ) -> None:
-        """Sets up a selector.
-
-        Args:
-            arm: The robot, which all categories share.
-            categories: See the class.
-            updates: See the class.
-            method: Name for the selections.
-
-        Raises:
-            RequestError: There is no category, or the probabilities are no distribution.
-        """
-        prior = check_distribution({name: c.probability for name, c in categories.items()})
         self.categories = dict(categories)
         self.updates = updates
-        self._prior = prior
-        likeliest = list(categories.values())[int(np.argmax(prior))].lic
-        super().__init__(arm, likeliest.first, likeliest.second, method)
+        self._prior = np.array([category.probability for category in categories.values()])
+        likeliest = list(categories.values())[int(np.argmax(self._prior))].lic
+        super().__init__(arm, likeliest.first, likeliest.second, "mixture")
 
     def objective(self, situation: Situation) -> MixtureObjective:
         """Returns what is maximised in a situation."""

@@ -6,16 +6,14 @@ import pytest
 from support.fake_reach import make_record
 from support.fake_reach import make_request as make_collection
 
-from lic_drake.errors import RequestError
 from lic_drake.evaluate.trials import read_trials
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.scenario import load_scenario
-from scripts.unknown_category.comparison import (
+from scripts.unknown_category.run import (
     NAMES,
-    Comparison,
+    common_scenario,
     compare,
-    make_strategies,
     unknown_category_table,
 )
 
@@ -35,33 +33,26 @@ def reach(request: ReachRequest) -> ReachRecord:
     )
 
 
-@pytest.fixture
-def comparison(tmp_path: Path) -> Comparison:
+def make_libraries(folder: Path) -> dict[str, ExperienceLibrary]:
     libraries = {}
     for category in LEFT_SUCCEEDS:
         scenario = load_scenario(category)
         request = make_collection(scenario=scenario, max_goals=2, max_starts=None)
-        library = libraries[category] = ExperienceLibrary(tmp_path / category)
+        library = libraries[category] = ExperienceLibrary(folder / category)
         for environment in range(3):
             records = list(map(reach, request.reaches(environment)))
             library.write_shard(f"training-{environment}", records, scenario)
-    return Comparison(libraries=libraries, goals_of="passage-clutter", results=tmp_path / "results")
+    return libraries
 
 
 @pytest.mark.slow
 def test_all_strategies_meet_the_same_goals_and_a_failure_tells_the_category(
-    comparison: Comparison,
+    tmp_path: Path,
 ) -> None:
-    made: list[str] = []
-
-    def counted(request: ReachRequest) -> ReachRecord:
-        made.append(request.key)
-        return reach(request)
-
-    rows, beliefs = compare(
-        comparison, range(2), say=lambda _: None, reach=counted, estimator="knn"
-    )
-    assert read_trials(comparison.results / "trials.parquet") == rows
+    libraries, results = make_libraries(tmp_path), tmp_path / "results"
+    goals = common_scenario(libraries["passage-clutter"])
+    rows, beliefs = compare(libraries, goals, results, range(2), reach, "knn")
+    assert read_trials(results / "trials.parquet") == rows
     first = [row for row in rows if row.attempt == 1]
     assert len(first) == 2 * 2 * len(NAMES)
     rate = {
@@ -82,9 +73,9 @@ def test_all_strategies_meet_the_same_goals_and_a_failure_tells_the_category(
     assert rate["final", 2] == rate["failure", 2] == 1.0
     believed = [p for of in beliefs["final"].values() for p in of]
     assert len(believed) == 2 and min(believed) > 0.9
-    goals = {tuple(r.p_WG) for c in LEFT_SUCCEEDS for r in records_of(comparison, c)}
-    assert len(goals) == 2
-    again, _ = compare(comparison, range(2), say=lambda _: None, reach=pytest.fail, estimator="knn")
+    records = [r for c in LEFT_SUCCEEDS for r in ExperienceLibrary(results / c).records()]
+    assert len({tuple(r.p_WG) for r in records}) == 2
+    again, _ = compare(libraries, goals, results, range(2), pytest.fail, "knn")
     assert [replace(r, seconds=0.0) for r in again] == [replace(r, seconds=0.0) for r in rows]
     table = unknown_category_table(rows, beliefs)
     assert [row[0] for row in table.rows if row] == list(NAMES.values())
@@ -94,20 +85,3 @@ def test_all_strategies_meet_the_same_goals_and_a_failure_tells_the_category(
 
 def key(row: object) -> tuple[object, ...]:
     return (row.variant, row.method, row.environment)
-
-
-def records_of(comparison: Comparison, category: str) -> list[ReachRecord]:
-    return ExperienceLibrary(comparison.results / category).records()
-
-
-def test_categories_that_share_no_starts_cannot_be_mixed(comparison: Comparison) -> None:
-    other = load_scenario("passage-clutter", "{task: {start_line: {x_m: 0.33}}}")
-    request = make_collection(scenario=other, max_goals=1)
-    library = ExperienceLibrary(comparison.results / "other")
-    library.write_shard("all", list(map(reach, request.reaches(0))), other)
-    cylinders = comparison.libraries["cylinder-clutter"]
-    mixed = {"cylinder-clutter": cylinders, "passage-clutter": library}
-    with pytest.raises(RequestError, match="have other arms or start lines"):
-        make_strategies(replace(comparison, libraries=mixed), "knn")
-    with pytest.raises(RequestError, match="two categories are compared"):
-        make_strategies(replace(comparison, libraries={"cylinder-clutter": cylinders}), "knn")

@@ -8,7 +8,6 @@ from numpy.typing import ArrayLike
 from support.select_surfaces import Bumps, random_model
 from support.starts import ARM, LINE
 
-from lic_drake.errors import RequestError
 from lic_drake.estimate.categories import features_of
 from lic_drake.estimate.features import PLANAR_LIC1
 from lic_drake.reach.start import Start, Starts
@@ -68,11 +67,6 @@ def test_bayes_rule_is_that_of_the_closed_form(categories: list[tuple[float, flo
     np.testing.assert_allclose(found, joint / joint.sum(), rtol=1e-9, atol=1e-300)
 
 
-def test_likelihoods_too_small_for_numbers_still_compare() -> None:
-    found = posterior(np.array([0.5, 0.5, 0.0]), np.array([-5000.0, -5001.0, 0.0]))
-    np.testing.assert_allclose(found, [1.0 / (1.0 + np.exp(-1.0)), 1.0 / (1.0 + np.e), 0.0])
-
-
 def test_values_and_gradients_are_the_weighted_sums() -> None:
     parts = [PlanarLic(ARM, random_model(seed)) for seed in (0, 1)]
     objective = mixture(0.3, *parts).objective(FIRST)
@@ -103,21 +97,6 @@ def test_the_likelier_category_decides_where_each_wants_another_start(
     assert chosen.probability == pytest.approx(0.9 * 0.9, abs=0.01)
 
 
-def test_a_start_that_suits_both_beats_the_best_of_each() -> None:
-    # Each category's favourite is ONE or nothing; TWO is second best in both.
-    chosen = mixture(0.5, lic(0.9, 0.6), lic(0.0, 0.6)).select(FIRST)
-    np.testing.assert_allclose(chosen.start.x0[1:], TWO, atol=0.02)
-
-
-def test_a_category_that_is_certain_selects_as_it_does_alone() -> None:
-    alone = lic(0.7, 0.2, second=(0.1, 0.6))
-    certain = mixture(1.0, alone, lic(0.1, 0.9, second=(0.9, 0.0)))
-    for situation in (FIRST, after(failed_at(ONE))):
-        np.testing.assert_allclose(
-            certain.select(situation).start.x0, alone.select(situation).start.x0
-        )
-
-
 def test_a_failure_speaks_against_the_category_that_promised_success() -> None:
     selector = mixture(0.6, lic(0.9, 0.0), lic(0.2, 0.7))
     belief = selector.belief(after(failed_at(ONE)))
@@ -146,11 +125,6 @@ def test_a_second_failure_counts_with_what_lic_2_promised() -> None:
     assert belief["one"] == pytest.approx(0.2 / (0.2 + 0.7), abs=1e-3)
 
 
-def test_without_lic_2_a_further_attempt_keeps_away_from_the_failed_one() -> None:
-    chosen = mixture(0.9, lic(0.9, 0.1), lic(0.9, 0.1)).select(after(failed_at(ONE)))
-    assert abs(chosen.start.x0[1] - ONE[0]) > 0.1
-
-
 @dataclass(frozen=True)
 class EndsAt:
     """Failures that end at one place more densely than elsewhere."""
@@ -171,10 +145,3 @@ def test_where_a_failure_ended_tells_categories_apart_that_fail_as_often() -> No
     assert selector.belief(after(failed_at(ONE, (0.5, -0.2))))["left"] == pytest.approx(0.1)
     unseen = FailedReach.from_start(Start(np.array([LINE.poses.line.x_m, *ONE])))
     assert selector.belief(after(unseen))["left"] == pytest.approx(0.5)
-
-
-@pytest.mark.parametrize("prior", [(), (0.5, 0.4), (1.5, -0.5), (float("nan"), 0.5)])
-def test_what_is_no_distribution_is_refused(prior: tuple[float, ...]) -> None:
-    categories = {str(i): Category(probability=p, lic=lic(0.5, 0.5)) for i, p in enumerate(prior)}
-    with pytest.raises(RequestError, match=r"add up to 1, got .* divide them by their sum"):
-        MixtureLic(ARM, categories)
