@@ -16,8 +16,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from adapter import select, simulate
 from threadpoolctl import threadpool_limits
+
+from scripts.reference.adapter import select, simulate
 
 FROZEN = Path(__file__).parent / "frozen"
 PLANAR = ("cylinder-clutter", "passage-clutter", "cylinder-aperture-clutter")
