@@ -7,7 +7,6 @@ from collections.abc import Collection, Mapping
 from typing import Any
 
 import yaml
-from pydrake.common.yaml import yaml_load_typed
 
 from lic_drake.errors import LicError, ScenarioError
 
@@ -25,6 +24,7 @@ def check_numbers(
     non_negative: Collection[str] = (),
     ranges: Mapping[str, tuple[float, float]] | None = None,
     vectors: Mapping[str, int] | None = None,
+    intervals: Collection[str] = (),
     ascending: Collection[tuple[str, str]] = (),
     error: type[LicError] = ScenarioError,
 ) -> None:
@@ -37,6 +37,7 @@ def check_numbers(
         non_negative: Names of fields that must be 0 or more and finite.
         ranges: Lowest and highest allowed value, which may be infinite, by name.
         vectors: Number of components, all finite, by name.
+        intervals: Names of fields that must be [least, most].
         ascending: Pairs of names; the first field must not exceed the second, in any component.
         error: What to raise.
 
@@ -56,6 +57,10 @@ def check_numbers(
         value = getattr(config, name)
         if len(value) != length or not all(map(math.isfinite, value)):
             raise error(f"{name} must be {length} finite numbers, got {value}")
+    for name in intervals:
+        value = getattr(config, name)
+        if len(value) != 2 or not value[0] <= value[1]:
+            raise error(f"{name} must be [least, most], got {value}")
     for name, (low, high, wanted) in limits.items():
         value = getattr(config, name)
         values = value if isinstance(value, list | tuple) else [value]
@@ -113,6 +118,8 @@ def read_section[T](schema: type[T], data: Any, source: str, defaults: T | None 
     Raises:
         ScenarioError: A key or value that does not fit.
     """
+    from pydrake.common.yaml import yaml_load_typed  # Configurations alone do not need Drake.
+
     try:
         # Drake's reader takes text only.
         section: T = yaml_load_typed(  # type: ignore[no-untyped-call]

@@ -1,15 +1,16 @@
 """The board with square apertures that stands before clutter in space (paper IV-B, V-B)."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.clutter.instance import ClutterInstance, join, make_objects
+from lic_drake.config import check_numbers
 from lic_drake.errors import ScenarioError
-from lic_drake.types import Vector
+from lic_drake.types import IntVector, Vector
 
 MAX_APERTURES = 20
-"""A board with more rows or columns is refused."""
+"""Maximum number of rows or columns of a board."""
 
 
 @dataclass(kw_only=True)
@@ -28,31 +29,23 @@ class ApertureBoard:
     # IV-B) there is no other room, and so do the poles of the authors' planar generator.
     aperture_m: float = 0.2
     bar_m: float = 0.01
-    # So many apertures are blocked, at random.
+    # Number of apertures that are blocked, at random.
     num_blocked: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("aperture_m", "bar_m"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0.0):
-                raise ScenarioError(f"{name} must be a positive number, got {value}")
-        if len(self.board_centre) != 3 or not np.all(np.isfinite(self.board_centre)):
-            raise ScenarioError(
-                f"board_centre must be [x, y, z] in metres, got {self.board_centre}"
-            )
-        for name in ("columns", "rows"):
-            if not 1 <= getattr(self, name) <= MAX_APERTURES:
-                raise ScenarioError(
-                    f"{name} must be from 1 to {MAX_APERTURES}, got {getattr(self, name)}"
-                )
+        check_numbers(
+            self,
+            positive=["aperture_m", "bar_m"],
+            ranges={
+                "columns": (1, MAX_APERTURES),
+                "rows": (1, MAX_APERTURES),
+                "num_blocked": (0, self.rows * self.columns - 1),
+            },
+            vectors={"board_centre": 3},
+        )
         if self.bar_m >= self.aperture_m:
             raise ScenarioError(
                 f"bars of {self.bar_m} m leave nothing of apertures of {self.aperture_m} m"
-            )
-        if not 0 <= self.num_blocked < self.rows * self.columns:
-            raise ScenarioError(
-                f"num_blocked must leave one of {self.rows * self.columns} apertures open,"
-                f" got {self.num_blocked}"
             )
 
     @property
@@ -65,28 +58,25 @@ class ApertureBoard:
         y = self.aperture_m * (np.arange(self.columns) - 0.5 * (self.columns - 1))
         z = self.aperture_m * (np.arange(self.rows) - 0.5 * (self.rows - 1))
         offsets = np.array([[0.0, yi, zi] for zi in z for yi in y])
-        return np.asarray(self.board_centre + offsets)
+        return self.board_centre + offsets
 
-    def bare_board(self) -> ClutterInstance:
-        """Returns the board alone with no aperture blocked: all that is known beforehand."""
-        p_WB, edges = self.bar_boxes()
-        k = len(p_WB)
-        return ClutterInstance(
-            category="board",
-            shape=("box",) * k,
-            size=edges,
-            p_WO=p_WB,
-            yaw=np.zeros(k),
-            mass=np.ones(k),
-            movable=np.zeros(k, dtype=bool),
-            p_WA=self.aperture_centres(),
-        )
-
-    def bar_boxes(self) -> tuple[Vector, Vector]:
-        """Returns centres and edges of the bars, each shape (k, 3), metres."""
+    def bare_board(self, material: str = "") -> ClutterInstance:
+        """Returns the bars alone, with every aperture open: what is known beforehand."""
         a, b = self.aperture_m, self.bar_m
         width, height = self.columns * a, self.rows * a
         upright = [[0.0, a * i - 0.5 * width, 0.0] for i in range(self.columns + 1)]
         level = [[0.0, 0.0, a * i - 0.5 * height] for i in range(self.rows + 1)]
         edges = [[b, b, height + b]] * len(upright) + [[b, width + b, b]] * len(level)
-        return np.array(upright + level) + self.board_centre, np.array(edges)
+        p_WB = np.array(upright + level) + self.board_centre
+        bars = make_objects("box", edges, p_WB, material=material)
+        return replace(bars, p_WA=self.aperture_centres())
+
+    def blocked_board(self, blocked: IntVector) -> ClutterInstance:
+        """Returns the board with covers as thick as its bars in some apertures, by index."""
+        p_WA = self.aperture_centres()
+        cover = [self.bar_m, self.aperture_m, self.aperture_m]
+        return join(
+            self.bare_board(),
+            make_objects("box", cover, p_WA[blocked]),
+            p_WA=np.delete(p_WA, blocked, axis=0),
+        )

@@ -3,19 +3,19 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.clutter.board import ApertureBoard
-from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.clutter.instance import ClutterInstance, join, make_objects
 from lic_drake.clutter.placement import MAX_TRIES, place_discs
 from lic_drake.clutter.stems import Stems
+from lic_drake.config import check_numbers
 from lic_drake.errors import ScenarioError
-from lic_drake.types import Vector
+from lic_drake.types import BoolVector, Vector
 
 MAX_STEMS = 300
-"""More stems are refused."""
+"""Maximum number of stems, and of branches."""
 MAX_LEAVES = 50
-"""More stems, or leaves on one of them, are refused."""
+"""Maximum number of leaves on a stem or branch."""
 
 
 @dataclass(kw_only=True)
@@ -27,7 +27,8 @@ class FoliageApertureClutter(ApertureBoard):
     """
 
     num_blocked: int = 6
-    # So many more apertures have a cover that leaves a part of them open, of this range of shares.
+    # Number of further apertures with a cover that leaves a part of them open, and the range of
+    # the covered shares.
     num_partly_covered: int = 2
     covered_share: list[float] = field(default_factory=lambda: [0.3, 0.7])
     # Thickness of the covers, metres; they are panels in the middle of the board.
@@ -63,60 +64,41 @@ class FoliageApertureClutter(ApertureBoard):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("num_stems", "num_branches"):
-            if not 0 <= getattr(self, name) <= MAX_STEMS:
-                raise ScenarioError(f"{name} must be from 0 to {MAX_STEMS}: {getattr(self, name)}")
-        if not 0 <= self.leaves_per_stem <= MAX_LEAVES:
-            raise ScenarioError(
-                f"leaves_per_stem must be from 0 to {MAX_LEAVES}, got {self.leaves_per_stem}"
-            )
-        for name in (
-            *(
-                "cover_m",
-                "margin_m",
-                "trough_m",
-                "root_distance_m",
-                "stem_radius_m",
-                "branch_radius_m",
+        check_numbers(
+            self,
+            positive=(
+                *("cover_m", "margin_m", "trough_m", "root_distance_m", "stem_radius_m"),
+                *("branch_radius_m", "rigidity_N_m2", "stem_kg_per_m", "damping_ratio"),
+                *("leaf_thickness_m", "leaf_kg"),
+                *("stem_length_m", "branch_length_m", "leaf_length_m", "leaf_width_m"),
             ),
-            *("rigidity_N_m2", "stem_kg_per_m", "damping_ratio", "leaf_thickness_m", "leaf_kg"),
-        ):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0.0):
-                raise ScenarioError(f"{name} must be a positive number, got {value}")
-        for name in ("stem_length_m", "branch_length_m", "leaf_length_m", "leaf_width_m"):
-            _check_range(name, getattr(self, name), np.inf)
-        _check_range("covered_share", self.covered_share, 1.0)
-        if not 0.0 <= self.hanging_share <= 1.0:
-            raise ScenarioError(f"hanging_share must be from 0 to 1, got {self.hanging_share}")
-        if not 0.0 <= self.max_slant_deg <= 45.0:
-            raise ScenarioError(f"max_slant_deg must be from 0 to 45, got {self.max_slant_deg}")
-        covered = self.num_blocked + self.num_partly_covered
-        if not (self.num_partly_covered >= 0 and covered < self.rows * self.columns):
-            raise ScenarioError(
-                f"num_blocked and num_partly_covered must leave one of {self.rows * self.columns}"
-                f" apertures open, got {self.num_blocked} and {self.num_partly_covered}"
-            )
-        self._check_box()
-
-    def _check_box(self) -> None:
-        for name in ("lower", "upper"):
-            value = getattr(self, name)
-            if len(value) != 3 or not np.all(np.isfinite(value)):
-                raise ScenarioError(f"{name} must be [x, y, z] in metres, got {value}")
-        if not np.all(np.array(self.lower) < self.upper):
-            raise ScenarioError(f"lower {self.lower} must be below upper {self.upper} in x, y, z")
+            ranges={
+                "num_stems": (0, MAX_STEMS),
+                "num_branches": (0, MAX_STEMS),
+                "leaves_per_stem": (0, MAX_LEAVES),
+                "num_partly_covered": (0, self.rows * self.columns - self.num_blocked - 1),
+                "covered_share": (0.0, 1.0),
+                "hanging_share": (0.0, 1.0),
+                "max_slant_deg": (0.0, 45.0),
+            },
+            intervals=(
+                *("stem_length_m", "branch_length_m", "leaf_length_m", "leaf_width_m"),
+                "covered_share",
+            ),
+            vectors={"lower": 3, "upper": 3},
+            ascending=[("lower", "upper")],
+        )
         if self.lower[0] < self.board_back_m:
             raise ScenarioError(
                 f"foliage from x = {self.lower[0]:.3f} m on would grow through the board, whose"
                 f" back is at {self.board_back_m:.3f} m; raise lower or move board_centre"
             )
-        if self.upper[0] - self.lower[0] <= 2.0 * self.margin_m:
+        width, depth, height = np.subtract(self.upper, self.lower)
+        if min(width, depth) <= 2.0 * self.margin_m:
             raise ScenarioError(
-                f"margins of {self.margin_m} m leave nothing between x = {self.lower[0]} and"
-                f" {self.upper[0]} m"
+                f"margins of {self.margin_m} m leave nothing between lower {self.lower} and upper"
+                f" {self.upper}"
             )
-        height = self.upper[2] - self.lower[2]
         longest = max(self.stem_length_m[1], self.branch_length_m[1])
         if longest > height:
             raise ScenarioError(
@@ -139,82 +121,63 @@ class FoliageApertureClutter(ApertureBoard):
         hangs = rng.random(len(p_WA)) < 0.5
         shares[order[: self.num_blocked]] = 1.0
         covered = np.sort(order[: self.num_blocked + self.num_partly_covered])
-        p_WB, edges = map(np.vstack, zip(self.bar_boxes(), self._supports(), strict=True))
-        n, k = len(p_WB), len(covered)
-        return ClutterInstance(
-            category="foliage-aperture-clutter",
-            shape=("box",) * (n + k),
-            size=np.vstack([edges, self._cover_edges(shares[covered])]),
-            p_WO=np.vstack([p_WB, self._cover_centres(p_WA[covered], shares[covered], hangs)]),
-            yaw=np.zeros(n + k),
-            mass=np.ones(n + k),
-            movable=np.zeros(n + k, dtype=bool),
+        return join(
+            self.bare_board("wood"),
+            *self._supports(),
+            self._covers(p_WA[covered], shares[covered], hangs[: len(covered)]),
             p_WA=np.delete(p_WA, covered, axis=0),
             stems=stems,
-            material=("wood",) * (n - 2) + ("clay", "wood") + ("cardboard",) * k,
         )
 
-    def _supports(self) -> tuple[Vector, Vector]:
-        """Returns centres and edges of the trough below and the beam above, each shape (2, 3)."""
+    def _supports(self) -> tuple[ClutterInstance, ClutterInstance]:
+        """Returns the trough below and the beam above."""
         low, high, up = np.array(self.lower), np.array(self.upper), np.eye(3)[2]
         middle, edges = 0.5 * (low + high), high - low
         trough, beam = edges.copy(), edges.copy()
         trough[2], beam[2] = self.trough_m, self.bar_m
-        p_WB = [middle - 0.5 * (edges + trough) * up, middle + 0.5 * (edges + beam) * up]
-        return np.array(p_WB), np.array([trough, beam])
+        return (
+            make_objects("box", trough, middle - 0.5 * (edges + trough) * up, material="clay"),
+            make_objects("box", beam, middle + 0.5 * (edges + beam) * up, material="wood"),
+        )
 
-    def _cover_edges(self, shares: Vector) -> Vector:
-        width = np.full(len(shares), self.aperture_m)
-        return np.column_stack([np.full(len(shares), self.cover_m), width, self._heights(shares)])
-
-    def _cover_centres(self, p_WA: Vector, shares: Vector, hangs: NDArray[np.bool_]) -> Vector:
-        """Returns the covers' centres; a cover of a part stands below or hangs above."""
-        offset = 0.5 * (self.aperture_m - self._heights(shares))
-        sign = np.where(hangs[: len(shares)], 1.0, -1.0)
-        centres: Vector = p_WA + np.outer(sign * offset, [0.0, 0.0, 1.0])
-        return centres
-
-    def _heights(self, shares: Vector) -> Vector:
-        """Returns heights of covers, which reach to the middle of a bar, metres."""
+    def _covers(self, p_WA: Vector, shares: Vector, hangs: BoolVector) -> ClutterInstance:
+        """Returns covers of shares of apertures; one of a part stands below or hangs above."""
+        # They reach to the middle of a bar.
         clear = self.aperture_m - self.bar_m
-        return np.where(shares < 1.0, shares * clear + 0.5 * self.bar_m, self.aperture_m)
+        height = np.where(shares < 1.0, shares * clear + 0.5 * self.bar_m, self.aperture_m)
+        offset = np.where(hangs, 1.0, -1.0) * (0.5 * (self.aperture_m - height))
+        p_WC = p_WA + np.outer(offset, [0.0, 0.0, 1.0])
+        edges = np.column_stack(np.broadcast_arrays(self.cover_m, self.aperture_m, height))
+        return make_objects("box", edges, p_WC, material="cardboard")
 
     def _grow(self, rng: np.random.Generator) -> Stems:
         m = self.num_stems + self.num_branches
         fixed = np.arange(m) >= self.num_stems
-        low, high = (
-            np.array(self.lower[:2]) + self.margin_m,
-            np.array(self.upper[:2]) - self.margin_m,
-        )
-        roots = place_discs(rng, m, low, high, self.root_distance_m)
+        low, high = np.array(self.lower) + self.margin_m, np.array(self.upper) - self.margin_m
+        roots = place_discs(rng, m, low[:2], high[:2], self.root_distance_m)
         hangs = rng.random(m) < self.hanging_share
-        length = np.where(
-            fixed, _draw(rng, self.branch_length_m, m), _draw(rng, self.stem_length_m, m)
-        )
+        of_branch = _draw(rng, self.branch_length_m, m)
+        length = np.where(fixed, of_branch, _draw(rng, self.stem_length_m, m))
         p_WH = np.column_stack([roots, np.where(hangs, self.upper[2], self.lower[2])])
-        R_WS = np.array([self._slant(rng, *row) for row in zip(p_WH, length, hangs, strict=True)])
+        slants = [self._slant(rng, *row) for row in zip(p_WH, length, hangs, strict=True)]
+        R_WS = np.array(slants).reshape(-1, 3, 3)
         leaves = [
-            self._leaf(rng, p, R, s)
-            for p, R, s in zip(p_WH, R_WS.reshape(-1, 3, 3), length, strict=True)
+            self._leaf(rng, *stem)
+            for stem in zip(p_WH, R_WS, length, strict=True)
             for _ in range(self.leaves_per_stem)
         ]
         # As stiff at the tip as a cantilever of that rigidity: L^2 / k = L^3 / (3 EI).
-        stiffness = np.where(fixed, np.inf, 3.0 * self.rigidity_N_m2 / length)
+        stiffness = 3.0 * self.rigidity_N_m2 / length
         mass = self.stem_kg_per_m * length + self.leaf_kg * self.leaves_per_stem
-        inertia = mass * length**2 / 3.0
-        damping = np.where(
-            fixed,
-            0.0,
-            2.0 * self.damping_ratio * np.sqrt(3.0 * self.rigidity_N_m2 / length * inertia),
-        )
+        damping = 2.0 * self.damping_ratio * np.sqrt(stiffness * (mass * length**2 / 3.0))
         return Stems(
             p_WH=p_WH,
-            R_WS=R_WS.reshape(-1, 3, 3),
+            R_WS=R_WS,
             length=length,
             radius=np.where(fixed, self.branch_radius_m, self.stem_radius_m),
             mass=mass,
-            stiffness=stiffness,
-            damping=damping,
+            stiffness=np.where(fixed, np.inf, stiffness),
+            damping=np.where(fixed, 0.0, damping),
             leaf_stem=np.repeat(np.arange(m), self.leaves_per_stem),
             p_SL=np.array([leaf[0] for leaf in leaves]).reshape(-1, 3),
             R_SL=np.array([leaf[1] for leaf in leaves]).reshape(-1, 3, 3),
@@ -224,10 +187,8 @@ class FoliageApertureClutter(ApertureBoard):
     def _slant(self, rng: np.random.Generator, p_WH: Vector, length: float, hangs: bool) -> Vector:
         """Draws R_WS of a stem whose tip stays within the box."""
         for _ in range(MAX_TRIES):
-            slant, azimuth = (
-                np.deg2rad(self.max_slant_deg) * rng.random(),
-                rng.uniform(0, 2 * np.pi),
-            )
+            slant = np.deg2rad(self.max_slant_deg) * rng.random()
+            azimuth = rng.uniform(0, 2 * np.pi)
             R_WS = _rotation(azimuth, np.pi - slant if hangs else slant)
             if self._holds(p_WH + length * R_WS[:, 2], self.margin_m):
                 return R_WS
@@ -240,14 +201,10 @@ class FoliageApertureClutter(ApertureBoard):
         self, rng: np.random.Generator, p_WH: Vector, R_WS: Vector, length: float
     ) -> tuple[Vector, Vector, Vector]:
         """Draws position, orientation and size of a leaf on a stem, within the box."""
+        signs = np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, -1).T
         for _ in range(MAX_TRIES):
-            size = np.array(
-                [
-                    _draw(rng, self.leaf_length_m, 1)[0],
-                    _draw(rng, self.leaf_width_m, 1)[0],
-                    self.leaf_thickness_m,
-                ]
-            )
+            edges = [_draw(rng, ends, 1) for ends in (self.leaf_length_m, self.leaf_width_m)]
+            size = np.append(edges, self.leaf_thickness_m)
             along = length * rng.uniform(0.1, 1.0)
             # Outwards and up the stem, by 10 to 60 degrees from straight across, and twisted.
             R_SL = _rotation(rng.uniform(0.0, 2.0 * np.pi), -np.deg2rad(rng.uniform(10.0, 60.0)))
@@ -255,8 +212,7 @@ class FoliageApertureClutter(ApertureBoard):
             c, s = np.cos(twist), np.sin(twist)
             R_SL = R_SL @ np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
             p_SL = np.array([0.0, 0.0, along]) + 0.5 * size[0] * R_SL[:, 0]
-            corners = 0.5 * size * (np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, -1).T)
-            if self._holds(p_WH + (p_SL + corners @ R_SL.T) @ R_WS.T):
+            if self._holds(p_WH + (p_SL + (0.5 * size * signs) @ R_SL.T) @ R_WS.T):
                 return p_SL, R_SL, size
         raise ScenarioError(
             f"no leaf on the stem at {p_WH.round(3)} fits between lower {self.lower} and upper"
@@ -264,7 +220,7 @@ class FoliageApertureClutter(ApertureBoard):
         )
 
     def _holds(self, p_WQ: Vector, margin: float = 0.0) -> bool:
-        """Tells whether the box holds points, those of a stem away from its sides."""
+        """Returns whether points lie in the box, at least `margin` from its sides."""
         inset = np.array([margin, margin, 0.0])
         low, high = np.array(self.lower) + inset, np.array(self.upper) - inset
         return bool(np.all(p_WQ >= low) and np.all(p_WQ <= high))
@@ -278,10 +234,3 @@ def _rotation(azimuth: float, tilt: float) -> Vector:
     """Returns Rz(azimuth) Ry(tilt): z is tilted towards the azimuth."""
     ca, sa, ct, st = np.cos(azimuth), np.sin(azimuth), np.cos(tilt), np.sin(tilt)
     return np.array([[ca * ct, -sa, ca * st], [sa * ct, ca, sa * st], [-st, 0.0, ct]])
-
-
-def _check_range(name: str, value: list[float], highest: float) -> None:
-    if len(value) != 2 or not (0.0 < value[0] <= value[1] < highest):
-        raise ScenarioError(
-            f"{name} must be [least, most], positive and below {highest:g}, got {value}"
-        )

@@ -1,11 +1,11 @@
 """passage-clutter: a narrow passage between two fixed walls (paper IV-A, Fig. 3b)."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from lic_drake.clutter.instance import ClutterInstance
-from lic_drake.errors import ScenarioError
+from lic_drake.clutter.instance import ClutterInstance, make_objects
+from lic_drake.config import check_numbers
 
 
 @dataclass(kw_only=True)
@@ -31,22 +31,13 @@ class PassageClutter:
     max_slope_deg: float = 35.0
 
     def __post_init__(self) -> None:
-        for name in ("gap_m", "wall_length_m", "wall_width_m", "wall_height_m"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                raise ScenarioError(f"{name} must be a positive number, got {value}")
-        if not len(self.centre_from) == len(self.centre_to) == 2 or not np.all(
-            np.isfinite([*self.centre_from, *self.centre_to])
-        ):
-            raise ScenarioError(
-                f"centre_from and centre_to must be [x, y] in metres, got {self.centre_from},"
-                f" {self.centre_to}"
-            )
-        if not -90.0 <= self.min_slope_deg <= self.max_slope_deg <= 90.0:
-            raise ScenarioError(
-                "slopes need -90 <= min_slope_deg <= max_slope_deg <= 90, got"
-                f" {self.min_slope_deg} and {self.max_slope_deg}"
-            )
+        check_numbers(
+            self,
+            positive=["gap_m", "wall_length_m", "wall_width_m", "wall_height_m"],
+            ranges={"min_slope_deg": (-90.0, 90.0), "max_slope_deg": (-90.0, 90.0)},
+            vectors={"centre_from": 2, "centre_to": 2},
+            ascending=[("min_slope_deg", "max_slope_deg")],
+        )
 
     def sample(self, rng: np.random.Generator) -> ClutterInstance:
         """Draws one environment: centre and slope uniform, the walls parallel to each other."""
@@ -55,13 +46,10 @@ class PassageClutter:
         slope = np.deg2rad(rng.uniform(self.min_slope_deg, self.max_slope_deg))
         # From the centre to the centre line of the wall on the left.
         to_wall = 0.5 * (self.gap_m + self.wall_width_m) * np.array([-np.sin(slope), np.cos(slope)])
-        return ClutterInstance(
-            category="passage-clutter",
-            shape=("box", "box"),
-            size=np.tile([self.wall_length_m, self.wall_width_m, self.wall_height_m], (2, 1)),
-            p_WO=np.column_stack([[centre + to_wall, centre - to_wall], np.zeros(2)]),
-            yaw=np.full(2, slope),
-            mass=np.ones(2),
-            movable=np.zeros(2, dtype=bool),
-            p_WG=np.append(centre, 0.0),
+        walls = make_objects(
+            "box",
+            [self.wall_length_m, self.wall_width_m, self.wall_height_m],
+            [centre + to_wall, centre - to_wall],
+            yaw=slope,
         )
+        return replace(walls, p_WG=np.append(centre, 0.0))

@@ -1,6 +1,7 @@
 """Uniform placement of discs in a rectangle, or of balls in a box, without overlap."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from lic_drake.errors import ScenarioError
 from lic_drake.types import Vector
@@ -12,8 +13,8 @@ MAX_TRIES = 10_000
 def place_discs(
     rng: np.random.Generator,
     count: int,
-    lower: Vector,
-    upper: Vector,
+    lower: ArrayLike,
+    upper: ArrayLike,
     min_distance: float,
 ) -> Vector:
     """Draws disc centres one after the other, rejecting those too close to earlier ones.
@@ -34,6 +35,7 @@ def place_discs(
     Raises:
         ScenarioError: The discs do not fit.
     """
+    lower, upper = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
     centres = np.empty((count, len(lower)))
     for i in range(count):
         for _ in range(MAX_TRIES):

@@ -5,8 +5,7 @@ from typing import Protocol
 
 import numpy as np
 
-from lic_drake.clutter.aperture import CylinderApertureClutter
-from lic_drake.clutter.cylinder import CylinderClutter
+from lic_drake.clutter.cylinder import CylinderApertureClutter, CylinderClutter
 from lic_drake.clutter.foliage import FoliageApertureClutter
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.clutter.passage import PassageClutter

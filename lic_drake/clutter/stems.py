@@ -3,14 +3,13 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lic_drake.types import Vector
+from lic_drake.types import BoolVector, IntVector, Vector, check_shapes
 
 
 @dataclass(frozen=True, kw_only=True)
 class Stems:
-    """Straight stems that bend at their roots, and the leaves on them, in W, SI units.
+    """m straight stems that bend at their roots, and the k leaves on them, in W, SI units.
 
     A stem is a rigid cylinder on a springy hinge at its root H. Its frame S lies at the root, Sz
     along the stem; with the spring at rest R_WS is as given here.
@@ -37,25 +36,16 @@ class Stems:
     mass: Vector
     stiffness: Vector
     damping: Vector
-    leaf_stem: NDArray[np.intp]
+    leaf_stem: IntVector
     p_SL: Vector
     R_SL: Vector
     leaf_size: Vector
 
     def __post_init__(self) -> None:
         m, k = len(self.p_WH), len(self.leaf_stem)
-        for name, expected in (
-            ("p_WH", (m, 3)),
-            ("R_WS", (m, 3, 3)),
-            *((name, (m,)) for name in ("length", "radius", "mass", "stiffness", "damping")),
-            ("leaf_stem", (k,)),
-            ("p_SL", (k, 3)),
-            ("R_SL", (k, 3, 3)),
-            ("leaf_size", (k, 3)),
-        ):
-            value = getattr(self, name)
-            if value.shape != expected:
-                raise ValueError(f"{name} has shape {value.shape}, expected {expected}")
+        check_shapes(self, p_WH=(m, 3), R_WS=(m, 3, 3), length=(m,), radius=(m,), mass=(m,))
+        check_shapes(self, stiffness=(m,), damping=(m,))
+        check_shapes(self, p_SL=(k, 3), R_SL=(k, 3, 3), leaf_size=(k, 3))
         if k and not (0 <= self.leaf_stem.min() and self.leaf_stem.max() < m):
             raise ValueError(f"leaf_stem must be from 0 to {m - 1}")
 
@@ -65,28 +55,21 @@ class Stems:
         return len(self.p_WH)
 
     @property
-    def fixed(self) -> NDArray[np.bool_]:
+    def fixed(self) -> BoolVector:
         """Which stems cannot bend, shape (m,)."""
-        fixed: NDArray[np.bool_] = np.isinf(self.stiffness)
-        return fixed
+        return np.isinf(self.stiffness)
 
     def translated(self, offset: Vector) -> "Stems":
         """Returns the same stems moved by an offset, shape (3,), metres."""
         return replace(self, p_WH=self.p_WH + offset)
 
-    def picked(self, which: NDArray[np.bool_]) -> "Stems":
+    def subset(self, which: BoolVector) -> "Stems":
         """Returns some of the stems with their leaves, by a mask of shape (m,)."""
         leaves = which[self.leaf_stem]
+        of_stems = ("p_WH", "R_WS", "length", "radius", "mass", "stiffness", "damping")
+        of_leaves = ("p_SL", "R_SL", "leaf_size")
         return Stems(
-            p_WH=self.p_WH[which],
-            R_WS=self.R_WS[which],
-            length=self.length[which],
-            radius=self.radius[which],
-            mass=self.mass[which],
-            stiffness=self.stiffness[which],
-            damping=self.damping[which],
+            **{name: getattr(self, name)[which] for name in of_stems},
+            **{name: getattr(self, name)[leaves] for name in of_leaves},
             leaf_stem=(np.cumsum(which) - 1)[self.leaf_stem[leaves]],
-            p_SL=self.p_SL[leaves],
-            R_SL=self.R_SL[leaves],
-            leaf_size=self.leaf_size[leaves],
         )

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lic_drake.clutter.board import ApertureBoard
-from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import PerceptionError, ScenarioError
 from lic_drake.perception.board_grid import BoardModel
 from lic_drake.perception.camera_station import CameraStation, Look
@@ -140,27 +139,11 @@ def estimate_board(scenario: Scenario, look: Look, moves: bool = True) -> Belief
     # `board_of` has checked that the scenario's clutter is a board.
     believed = replace(scenario, clutter=seen)  # type: ignore[arg-type]
     stand = believed.task.stand if moves else None
-    starts = pointing_starts(believed, _with_covers(seen, index), stand)
+    covered = np.delete(np.arange(len(found.p_WA)), index)
+    starts = pointing_starts(believed, seen.blocked_board(covered), stand)
     return Belief(
         look=look,
         p_WG=look.goal.p_WG,
         starts=replace(starts, probability_open=found.probability_open[index]),
         index=index,
-    )
-
-
-def _with_covers(board: ApertureBoard, index: NDArray[np.intp]) -> ClutterInstance:
-    """Returns a board with covers, as thick as its bars, in all apertures but these."""
-    bare, p_WA = board.bare_board(), board.aperture_centres()
-    covered = np.delete(p_WA, index, axis=0)
-    k, edge = len(covered), board.aperture_m
-    return replace(
-        bare,
-        shape=bare.shape + ("box",) * k,
-        size=np.vstack([bare.size, np.tile([board.bar_m, edge, edge], (k, 1))]),
-        p_WO=np.vstack([bare.p_WO, covered]),
-        yaw=np.zeros(len(bare.yaw) + k),
-        mass=np.ones(len(bare.mass) + k),
-        movable=np.zeros(len(bare.movable) + k, dtype=bool),
-        p_WA=p_WA[index],
     )

@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 
 from lic_drake.clutter.board import ApertureBoard
-from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.clutter.instance import ClutterInstance, make_objects
 from lic_drake.errors import RequestError, ScenarioError
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.start import Starts
@@ -235,9 +235,9 @@ def _preselect(
         places: Places of the base, y, metres.
         heights: Heights of the torso, metres.
     """
-    checker = CollisionChecker(
-        Pr2Arm(mobile=True), _board(np.array(boxes).reshape(-1, 6)), SceneConfig()
-    )
+    p_WO, edges = np.hsplit(np.array(boxes), 2)
+    board = make_objects("box", edges, p_WO)
+    checker = CollisionChecker(Pr2Arm(mobile=True), board, SceneConfig())
     x0, bases, angles = [], [], []
     for y_m, torso_m in product(places, heights):
         b0 = np.array([0.0, y_m, torso_m])
@@ -285,19 +285,6 @@ def _steps(low: float, high: float, step: float) -> tuple[float, ...]:
     """Returns numbers from low to high, both included, apart by at most a step."""
     count = int(np.ceil((high - low) / step - 1e-9)) + 1
     return tuple(np.round(np.linspace(low, high, count), 6).tolist())
-
-
-def _board(boxes: Vector) -> ClutterInstance:
-    n = len(boxes)
-    return ClutterInstance(
-        category="board",
-        shape=("box",) * n,
-        size=boxes[:, 3:],
-        p_WO=boxes[:, :3],
-        yaw=np.zeros(n),
-        mass=np.ones(n),
-        movable=np.zeros(n, dtype=bool),
-    )
 
 
 def _rows(values: Vector) -> tuple[tuple[float, ...], ...]:

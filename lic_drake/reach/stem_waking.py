@@ -73,7 +73,7 @@ class StemWakingSimulation(PartlyAsleep):
                 self._diagrams.clear()
                 # Diagrams with Python systems are reference cycles: only the collector frees them.
                 gc.collect()
-            present = replace(self._instance, stems=self._stems.picked(awake))
+            present = replace(self._instance, stems=self._stems.subset(awake))
             diagram = make_reach_diagram(self._scenario, present, torso_m=self._torso_m)
             self._diagrams[key] = Simulation(diagram, self._scenario.scene)
         return self._diagrams[key]

@@ -69,4 +69,4 @@ class CollisionChecker:
 
 def _fixed_part(instance: ClutterInstance) -> ClutterInstance:
     """Returns the fixed objects; stems, also fixed ones, are inside, where nobody can look."""
-    return replace(instance.picked(np.flatnonzero(~instance.movable)), stems=None)
+    return replace(instance.subset(np.flatnonzero(~instance.movable)), stems=None)

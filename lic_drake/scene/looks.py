@@ -33,6 +33,5 @@ MATERIAL_COLORS = {
 
 def object_color(instance: ClutterInstance, i: int) -> Color:
     """Returns the colour of an object: its material's, or whether it can be pushed."""
-    if instance.material is not None:
-        return MATERIAL_COLORS[instance.material[i]]
-    return MOVABLE_COLOR if instance.movable[i] else FIXED_COLOR
+    by_mobility = MOVABLE_COLOR if instance.movable[i] else FIXED_COLOR
+    return MATERIAL_COLORS.get(instance.material[i], by_mobility)

@@ -55,10 +55,10 @@ def put_to_sleep(instance: ClutterInstance, spares: int) -> ClutterInstance:
         spares: Number of objects that can be awake at a time.
     """
     fixed, first = np.flatnonzero(~instance.movable), int(np.argmax(instance.movable))
-    picked = instance.picked(np.r_[fixed, np.full(spares, first)])
-    n, p_WO = len(fixed), picked.p_WO.copy()
+    chosen = instance.subset(np.r_[fixed, np.full(spares, first)])
+    n, p_WO = len(fixed), chosen.p_WO.copy()
     p_WO[n:, : instance.num_axes] = PARKING_M + np.arange(spares)[:, np.newaxis]
-    return replace(picked, p_WO=p_WO)
+    return replace(chosen, p_WO=p_WO)
 
 
 class SkinAxes:

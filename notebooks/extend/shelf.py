@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.clutter.instance import ClutterInstance, join, make_objects
 from lic_drake.clutter.placement import place_discs
 from lic_drake.clutter.registry import register_category
-from lic_drake.errors import ScenarioError
+from lic_drake.config import check_numbers
 from lic_drake.estimate.categories import register_features
 
 
@@ -28,10 +28,8 @@ class ShelfClutter:
     wall_m: float = 0.02
 
     def __post_init__(self) -> None:
-        if not 0 < self.num_boxes <= 40:
-            raise ScenarioError(f"num_boxes must be from 1 to 40, got {self.num_boxes}")
-        if not 0.0 < self.min_edge_m <= self.max_edge_m:
-            raise ScenarioError("edges need 0 < min_edge_m <= max_edge_m")
+        check_numbers(self, positive=["min_edge_m", "mass_kg"], ranges={"num_boxes": (1, 40)})
+        check_numbers(self, ascending=[("min_edge_m", "max_edge_m")])
 
     def sample(self, rng: np.random.Generator) -> ClutterInstance:
         """Draws one environment: boxes turned at random, none overlapping another or a wall."""
@@ -40,18 +38,13 @@ class ShelfClutter:
         upper = np.array([self.back_x_m, half]) - radius - 0.5 * self.wall_m
         centres = place_discs(rng, n, lower, upper, 2.0 * radius)
         edges = rng.uniform(self.min_edge_m, self.max_edge_m, (n, 2))
+        size, yaw = np.insert(edges, 2, self.height_m, axis=1), rng.uniform(-np.pi, np.pi, n)
+        boxes = make_objects("box", size, centres, yaw=yaw, mass=self.mass_kg, movable=True)
         middle, depth = 0.5 * (self.front_x_m + self.back_x_m), self.back_x_m - self.front_x_m
-        walls = np.array([[self.back_x_m, 0.0], [middle, -half], [middle, half]])
-        wall_edges = np.array([[self.wall_m, self.width_m], *[[depth, self.wall_m]] * 2])
-        return ClutterInstance(
-            category="shelf-clutter",
-            shape=("box",) * (n + 3),
-            size=np.column_stack([np.vstack([edges, wall_edges]), np.full(n + 3, self.height_m)]),
-            p_WO=np.column_stack([np.vstack([centres, walls]), np.zeros(n + 3)]),
-            yaw=np.append(rng.uniform(-np.pi, np.pi, n), np.zeros(3)),
-            mass=np.full(n + 3, self.mass_kg),
-            movable=np.arange(n + 3) < n,
-        )
+        across, along = [self.wall_m, self.width_m], [depth, self.wall_m]
+        back = make_objects("box", [*across, self.height_m], [self.back_x_m, 0.0])
+        sides = make_objects("box", [*along, self.height_m], [[middle, -half], [middle, half]])
+        return join(boxes, back, sides)
 
 
 register_category("shelf-clutter", ShelfClutter)

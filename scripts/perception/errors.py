@@ -66,7 +66,7 @@ class GoalError:
 
 def true_states(board: ApertureBoard, instance: ClutterInstance) -> tuple[str, ...]:
     """Returns what each aperture of a board is: "open", "partly" or "blocked"."""
-    assert instance.p_WA is not None and instance.material is not None
+    assert instance.p_WA is not None
     covers = np.array([name == "cardboard" for name in instance.material])
     height, middle = instance.size[covers, 2], instance.p_WO[covers]
     states = []

@@ -1,44 +1,114 @@
+"""The board with apertures, alone and before spheres."""
+
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.distance import pdist
 
 from lic_drake.clutter.board import ApertureBoard
-from lic_drake.clutter.foliage import FoliageApertureClutter
+from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.clutter.sphere import SphereApertureClutter
 from lic_drake.errors import ScenarioError
+from lic_drake.reach.scenario import load_scenario
+from lic_drake.seeds import make_generator
+
+SCENARIO = load_scenario("sphere-aperture-clutter")
+SHIPPED = SphereApertureClutter()
 
 
-def test_spheres_and_foliage_stand_behind_the_same_kind_of_board() -> None:
-    board, spheres, foliage = ApertureBoard(), SphereApertureClutter(), FoliageApertureClutter()
-    for other in (spheres, foliage):
-        np.testing.assert_array_equal(other.aperture_centres(), board.aperture_centres())
-        for ours, theirs in zip(board.bar_boxes(), other.bar_boxes(), strict=True):
-            np.testing.assert_array_equal(ours, theirs)
+def sample(clutter: SphereApertureClutter, index: int = 0) -> ClutterInstance:
+    return clutter.sample(make_generator("training", "spheres", index))
 
 
-def test_bars_leave_square_openings_around_the_aperture_centres() -> None:
-    board = ApertureBoard(columns=3, rows=2, aperture_m=0.3, bar_m=0.04)
-    p_WB, edges = board.bar_boxes()
-    assert len(p_WB) == 4 + 3
-    for p_WA in board.aperture_centres():
-        for direction in (np.eye(3)[1], -np.eye(3)[1], np.eye(3)[2], -np.eye(3)[2]):
-            for along, inside in ((0.129, False), (0.131, True), (0.169, True)):
-                p_WQ = p_WA + along * direction
-                hit = np.any(np.all(np.abs(p_WQ - p_WB) <= 0.5 * edges, axis=1))
-                assert hit == inside
+def is_in_board(instance: ClutterInstance, p_WQ: np.ndarray) -> np.ndarray:
+    """Returns which points lie in one of the instance's boxes."""
+    boxes = ~instance.movable
+    inside = np.abs(p_WQ[:, None] - instance.p_WO[boxes]) <= 0.5 * instance.size[boxes] + 1e-12
+    return np.any(np.all(inside, axis=2), axis=1)
+
+
+def test_the_shipped_scenario_has_the_papers_numbers() -> None:
+    assert SCENARIO.clutter == SHIPPED
+    instance = sample(SHIPPED)
+    assert np.count_nonzero(instance.movable) == 40
+    np.testing.assert_array_equal(instance.size[instance.movable, 0], 0.05)
+    np.testing.assert_array_equal(instance.mass[instance.movable], 0.1)
+    box = np.array(SHIPPED.upper) - SHIPPED.lower
+    np.testing.assert_allclose(box + [2.0 * 0.05, 0.0, 0.0], [0.29, 0.7, 0.4])
+
+
+def test_goals_and_apertures_are_the_papers_grids() -> None:
+    goals = SCENARIO.goals("training", 0)
+    apertures = SCENARIO.sample_instance("training", 0).p_WA
+    assert apertures is not None
+    for grid, extent, count in ((goals, [0.0, 0.6, 0.4], 12), (apertures, [0.0, 0.8, 0.6], 20)):
+        assert len(grid) == count
+        np.testing.assert_allclose(np.ptp(grid, axis=0), extent, atol=1e-12)
+        assert pdist(grid).min() == pytest.approx(0.2)
+        # One behind the other's middle.
+        np.testing.assert_allclose(grid.mean(axis=0)[1:], [-0.29, 0.89], atol=1e-12)
+    assert goals[:, 0].min() > SHIPPED.upper[0] + SHIPPED.radius_m
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_spheres_lie_in_their_box_without_overlap(index: int) -> None:
+    instance = sample(SHIPPED, index)
+    p_WO = instance.p_WO[instance.movable]
+    assert np.all(p_WO >= SHIPPED.lower)
+    assert np.all(p_WO <= SHIPPED.upper)
+    assert pdist(p_WO).min() >= 0.1
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(1, 6), st.integers(1, 6), st.floats(0.1, 0.4), st.floats(0.005, 0.05), st.data())
+def test_a_board_is_closed_but_for_its_open_apertures(
+    rows: int, columns: int, aperture_m: float, bar_m: float, data: st.DataObject
+) -> None:
+    board = ApertureBoard(rows=rows, columns=columns, aperture_m=aperture_m, bar_m=bar_m)
+    n = rows * columns
+    blocked = data.draw(st.lists(st.integers(0, n - 1), unique=True, max_size=n - 1))
+    instance = board.blocked_board(np.array(blocked, dtype=int))
+    assert instance.p_WA is not None
+    assert len(instance.p_WA) == n - len(blocked)
+    half = 0.5 * np.array([columns * aperture_m + bar_m, rows * aperture_m + bar_m])
+    across = np.random.default_rng(0).uniform(-half, half, (2000, 2))
+    p_WQ = np.array(board.board_centre) + np.insert(across, 0, 0.0, axis=1)
+    clear = 0.5 * (aperture_m - bar_m)
+    offset = np.abs(p_WQ[:, None, 1:] - instance.p_WA[:, 1:]).max(axis=2).min(axis=1)
+    np.testing.assert_array_equal(is_in_board(instance, p_WQ), offset >= clear)
+
+
+def test_what_is_blocked_is_random_and_leaves_the_spheres_as_they_are() -> None:
+    blocked = replace(SHIPPED, num_blocked=15)
+    opened = np.array([sample(blocked, index).p_WA for index in range(200)])
+    assert opened.shape == (200, 5, 3)
+    centres = SHIPPED.aperture_centres()[:, None, None]
+    counts = np.all(np.isclose(opened, centres), axis=3).sum(axis=(1, 2))
+    assert counts.sum() == 1000
+    assert counts.min() >= 25  # 50 expected, standard deviation 6.1.
+    assert counts.max() <= 75
+    np.testing.assert_array_equal(sample(blocked).p_WO[:40], sample(SHIPPED).p_WO[:40])
 
 
 @pytest.mark.parametrize(
     ("values", "message"),
     [
+        ({"num_spheres": -1}, "num_spheres must be from 0"),
+        ({"radius_m": 0.0}, "radius_m must be a positive number"),
+        ({"lower": [0.0, 0.0]}, "lower must be 3 finite numbers"),
         ({"rows": 21}, "rows must be from 1 to 20, got 21"),
-        ({"bar_m": -1.0}, "bar_m must be a positive number, got -1"),
         ({"bar_m": 0.2}, "leave nothing of apertures"),
-        ({"board_centre": [0.0, float("nan"), 0.0]}, r"board_centre must be \[x, y, z\]"),
-        ({"num_blocked": 20}, "must leave one of 20 apertures open"),
+        ({"num_blocked": 20}, "num_blocked must be from 0 to 19, got 20"),
+        ({"board_centre": [0.55, 0.0, 1.0]}, "would stand in the board"),
     ],
 )
 def test_values_that_make_no_sense_are_refused(values: dict[str, Any], message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
-        ApertureBoard(**values)
+        replace(SHIPPED, **values)
+    with pytest.raises(ScenarioError, match=r"of 300 objects fit into .* m\^3"):
+        sample(replace(SHIPPED, num_spheres=300))

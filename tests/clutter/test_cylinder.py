@@ -6,9 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.distance import pdist
 from scipy.stats import kstest
+from support.worlds import corners
 
-from lic_drake.clutter.cylinder import MAX_OBJECTS, CylinderClutter
+from lic_drake.clutter.cylinder import CylinderApertureClutter, CylinderClutter
 from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.clutter.placement import place_discs
 from lic_drake.errors import ScenarioError
 from lic_drake.seeds import STREAMS, make_generator
 
@@ -19,9 +21,8 @@ def sample(clutter: CylinderClutter, stream: str = "training", index: int = 0) -
 
 def test_the_defaults_are_the_papers_field() -> None:
     instance = sample(CylinderClutter())
-    assert instance.num_objects == 80
+    assert instance.shape == ("cylinder",) * 80
     assert np.count_nonzero(instance.movable) == 40
-    assert set(instance.shape) == {"cylinder"}
     np.testing.assert_array_equal(instance.size, np.tile([0.01, 0.2, 0.0], (80, 1)))
     np.testing.assert_array_equal(instance.mass, 1.0)
     extent = np.subtract(CylinderClutter().upper, CylinderClutter().lower)
@@ -34,8 +35,6 @@ FIELDS = st.builds(
     num_movable=st.integers(0, 30),
     num_fixed=st.integers(0, 30),
     radius_m=st.floats(1e-3, 0.02),
-    length_m=st.floats(0.01, 1.0),
-    mass_kg=st.floats(1e-2, 10.0),
     lower=st.tuples(st.floats(-2.0, 0.0), st.floats(-2.0, 0.0)).map(list),
     upper=st.tuples(st.floats(0.8, 2.0), st.floats(0.8, 2.0)).map(list),
 )
@@ -53,17 +52,13 @@ def test_any_field_has_its_counts_stays_in_its_bounds_and_does_not_overlap(
     assert np.all(instance.p_WO[:, :2] >= clutter.lower)
     assert np.all(instance.p_WO[:, :2] <= clutter.upper)
     np.testing.assert_array_equal(instance.p_WO[:, 2], 0.0)
-    np.testing.assert_array_equal(instance.size[:, 0], clutter.radius_m)
-    np.testing.assert_array_equal(instance.size[:, 1], clutter.length_m)
-    np.testing.assert_array_equal(instance.mass, clutter.mass_kg)
     if n > 1:
         assert pdist(instance.p_WO[:, :2]).min() >= 2.0 * clutter.radius_m * (1.0 - 1e-12)
 
 
 def test_an_index_always_gives_the_same_field_and_another_one_gives_another() -> None:
     clutter = CylinderClutter()
-    first = sample(clutter, index=3)
-    np.testing.assert_array_equal(first.p_WO, sample(clutter, index=3).p_WO)
+    np.testing.assert_array_equal(sample(clutter, index=3).p_WO, sample(clutter, index=3).p_WO)
     fields = [sample(clutter, stream, index).p_WO for stream in STREAMS for index in (3, 4)]
     centres = np.vstack(fields)
     assert len(np.unique(centres, axis=0)) == len(centres)
@@ -80,32 +75,95 @@ def test_centres_are_uniform_over_the_rectangle_for_fixed_and_movable_alike() ->
         assert abs(np.corrcoef(unit.T)[0, 1]) < 0.07  # 4000 draws: 4.4 standard deviations.
 
 
+def test_discs_are_drawn_one_after_the_other_until_no_more_fit() -> None:
+    few = place_discs(np.random.default_rng(5), 10, [0, 0], [1, 1], 0.05)
+    many = place_discs(np.random.default_rng(5), 40, [0, 0], [1, 1], 0.05)
+    np.testing.assert_array_equal(few, many[:10])
+    with pytest.raises(ScenarioError, match=r"only 1 of 2 objects fit into 1 m\^2 at .* 2 m; use"):
+        place_discs(np.random.default_rng(0), 2, [0, 0], [1, 1], 2.0)
+
+
+BARRIERS = st.builds(
+    CylinderApertureClutter,
+    num_movable=st.integers(0, 5),
+    num_fixed=st.integers(0, 5),
+    barrier_x_m=st.floats(0.1, 0.34),
+    barrier_length_m=st.floats(1.7, 4.0),
+    barrier_thickness_m=st.floats(1e-3, 0.03),
+    num_apertures=st.integers(1, 3),
+    aperture_width_m=st.floats(0.02, 0.07),
+    aperture_y_min_m=st.floats(-0.7, -0.3),
+    aperture_y_max_m=st.floats(0.3, 0.7),
+)
+
+
+@settings(max_examples=60)
+@given(BARRIERS, st.integers(0, 2**32 - 1))
+def test_the_barriers_parts_tile_its_line_but_for_the_openings(
+    clutter: CylinderApertureClutter, index: int
+) -> None:
+    instance = sample(clutter, index=index)
+    walls = [i for i, shape in enumerate(instance.shape) if shape == "box"]
+    assert not instance.movable[walls].any()
+    ends = []
+    for i in walls:
+        x, y = corners(instance, i).T
+        half = 0.5 * clutter.barrier_thickness_m
+        assert x.min() == pytest.approx(clutter.barrier_x_m - half, abs=1e-12)
+        assert x.max() == pytest.approx(clutter.barrier_x_m + half, abs=1e-12)
+        ends.append((y.min(), y.max()))
+    ends.sort()
+    # From end to end: part, opening, part, ..., part.
+    half = 0.5 * clutter.barrier_length_m
+    assert ends[0][0] == pytest.approx(-half, abs=1e-12)
+    assert ends[-1][1] == pytest.approx(half, abs=1e-12)
+    low, high = np.array([(ends[k][1], ends[k + 1][0]) for k in range(len(ends) - 1)]).T
+    np.testing.assert_allclose(high - low, clutter.aperture_width_m, atol=1e-12)
+    p_WA = instance.p_WA
+    assert p_WA is not None and p_WA.shape == (clutter.num_apertures, 3)
+    np.testing.assert_allclose(0.5 * (low + high), p_WA[:, 1], atol=1e-12)
+    np.testing.assert_array_equal(p_WA[:, [0, 2]], [[clutter.barrier_x_m, 0.0]] * len(p_WA))
+    assert np.all(p_WA[:, 1] >= clutter.aperture_y_min_m)
+    assert np.all(p_WA[:, 1] <= clutter.aperture_y_max_m)
+    assert np.all(np.diff(p_WA[:, 1]) >= 2.0 * clutter.aperture_width_m - 1e-12)
+
+
+def test_the_cylinders_behind_a_barrier_are_those_of_cylinder_clutter() -> None:
+    clutter = CylinderApertureClutter()
+    for index in range(20):
+        expected, instance = sample(CylinderClutter(), index=index), sample(clutter, index=index)
+        n = expected.num_objects
+        for name in ("p_WO", "size", "mass", "movable"):
+            np.testing.assert_array_equal(getattr(instance, name)[:n], getattr(expected, name))
+        behind = clutter.barrier_x_m + 0.5 * clutter.barrier_thickness_m
+        assert np.all(instance.p_WO[:n, 0] - clutter.radius_m >= behind)
+
+
+def test_the_centres_of_openings_are_uniform() -> None:
+    one = CylinderApertureClutter(num_apertures=1, num_movable=0, num_fixed=0)
+    y = np.array([sample(one, index=index).p_WA[0, 1] for index in range(1500)])
+    assert kstest((y - one.aperture_y_min_m) / 1.2, "uniform").pvalue > 1e-3
+
+
 @pytest.mark.parametrize(
     ("values", "message"),
     [
         ({"num_movable": -1}, "num_movable must be from 0 to 2000, got -1"),
-        ({"num_fixed": MAX_OBJECTS + 1}, "num_fixed must be from 0 to 2000, got 2001"),
         ({"radius_m": 0.0}, "radius_m must be a positive number, got 0.0"),
-        ({"radius_m": float("nan")}, "radius_m must be a positive number, got nan"),
-        ({"length_m": -0.2}, "length_m must be a positive number, got -0.2"),
-        ({"length_m": float("inf")}, "length_m must be a positive number, got inf"),
-        ({"mass_kg": 0.0}, "mass_kg must be a positive number, got 0.0"),
-        ({"lower": [0.1]}, r"lower and upper must be \[x, y\]"),
-        ({"lower": [0.0, 0.0, 0.0], "upper": [1.0, 1.0, 1.0]}, r"must be \[x, y\]"),
-        ({"upper": [1.0, float("inf")]}, r"must be \[x, y\] in metres.*inf"),
-        ({"lower": [2.0, -1.0]}, r"lower \[2.0, -1.0\] must be below upper \[1.02, 1.2\]"),
-        ({"upper": [1.02, -1.2]}, r"must be below upper \[1.02, -1.2\]"),
+        ({"lower": [0.1]}, r"lower must be 2 finite numbers, got \[0.1\]"),
+        ({"upper": [1.02, -1.3]}, "lower must not exceed upper"),
+        ({"num_apertures": 51}, "num_apertures must be from 1 to 50, got 51"),
+        ({"aperture_y_min_m": 0.7}, "aperture_y_min_m must not exceed aperture_y_max_m"),
+        ({"barrier_length_m": 1.3}, "do not fit into a barrier of 1.3 m; give it a larger"),
+        ({"barrier_x_m": 0.36}, "cylinders from x = 0.360 m on would stand in the barrier at 0.36"),
     ],
 )
 def test_a_value_that_cannot_be_used_is_named(values: dict[str, Any], message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
-        CylinderClutter(**values)
+        CylinderApertureClutter(**values)
 
 
-def test_a_field_too_dense_says_how_many_fitted_and_what_to_do() -> None:
-    clutter = CylinderClutter(
-        num_movable=0, num_fixed=40, radius_m=0.1, lower=[0.0, 0.0], upper=[0.5, 0.5]
-    )
-    with pytest.raises(ScenarioError, match=r"only (\d+) of 40 objects fit") as caught:
+def test_openings_that_do_not_fit_beside_each_other_are_refused() -> None:
+    clutter = CylinderApertureClutter(num_apertures=8, num_movable=0, num_fixed=0)
+    with pytest.raises(ScenarioError, match="of 8 objects fit into"):
         sample(clutter)
-    assert "use fewer or smaller objects or a larger region" in str(caught.value)

@@ -1,75 +1,98 @@
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.clutter.instance import join, make_objects
+from lic_drake.clutter.stems import Stems
+
+STEMS = Stems(
+    p_WH=np.arange(6.0).reshape(2, 3),
+    R_WS=np.tile(np.eye(3), (2, 1, 1)),
+    length=np.ones(2),
+    radius=np.full(2, 0.01),
+    mass=np.full(2, 0.1),
+    stiffness=np.array([4.0, np.inf]),
+    damping=np.array([0.1, 0.0]),
+    leaf_stem=np.array([1, 0, 1]),
+    p_SL=np.arange(9.0).reshape(3, 3),
+    R_SL=np.tile(np.eye(3), (3, 1, 1)),
+    leaf_size=np.full((3, 3), 0.01),
+)
+MIXED = join(
+    make_objects(
+        "cylinder", [0.01, 0.2], [[1.0, 2.0], [3.0, 4.0]], mass=0.5, movable=[True, False]
+    ),
+    make_objects("box", [[1.0, 2.0, 3.0]], [5.0, 6.0, 7.0], yaw=0.3, movable=True, material="wood"),
+    p_WG=np.array([0.1, 0.2, 0.0]),
+    p_WA=np.ones((2, 3)),
+)
 
 
-def arrays(n: int) -> dict[str, Any]:
-    return {
-        "category": "test",
-        "shape": ("box",) * n,
-        "size": np.ones((n, 3)),
-        "p_WO": np.zeros((n, 3)),
-        "yaw": np.zeros(n),
-        "mass": np.ones(n),
-        "movable": np.zeros(n, dtype=bool),
-    }
+def test_objects_of_several_kinds_are_joined_in_order() -> None:
+    assert MIXED.shape == ("cylinder", "cylinder", "box")
+    np.testing.assert_array_equal(MIXED.size, [[0.01, 0.2, 0.0], [0.01, 0.2, 0.0], [1.0, 2.0, 3.0]])
+    np.testing.assert_array_equal(MIXED.p_WO, [[1.0, 2.0, 0.0], [3.0, 4.0, 0.0], [5.0, 6.0, 7.0]])
+    np.testing.assert_array_equal(MIXED.yaw, [0.0, 0.0, 0.3])
+    np.testing.assert_array_equal(MIXED.mass, [0.5, 0.5, 1.0])
+    np.testing.assert_array_equal(MIXED.movable, [True, False, True])
+    assert MIXED.material == ("", "", "wood")
+    assert join().num_objects == make_objects("box", [1, 1, 1], np.empty((0, 3))).num_objects == 0
+    assert (MIXED.num_axes, make_objects("sphere", [0.1], [0.0, 0.0]).num_axes) == (2, 3)
 
 
-@pytest.mark.parametrize("n", [0, 1, 5])
-def test_the_number_of_objects_is_that_of_the_shapes(n: int) -> None:
-    assert ClutterInstance(**arrays(n)).num_objects == n
-
-
-@pytest.mark.parametrize("name", ["size", "p_WO", "yaw", "mass", "movable"])
-def test_arrays_of_another_length_are_refused(name: str) -> None:
-    values = arrays(3) | {name: arrays(2)[name]}
-    with pytest.raises(ValueError, match=rf"{name} has shape \(2"):
-        ClutterInstance(**values)
-
-
-def test_a_goal_is_a_point_in_space() -> None:
-    assert ClutterInstance(**arrays(1)).p_WG is None
-    assert ClutterInstance(**arrays(1), p_WG=np.zeros(3)).p_WG is not None
-    with pytest.raises(ValueError, match=r"p_WG has shape \(2,\), expected \(3,\)"):
-        ClutterInstance(**arrays(1), p_WG=np.zeros(2))
-
-
-def test_apertures_are_points_in_space() -> None:
-    assert ClutterInstance(**arrays(1)).p_WA is None
-    assert ClutterInstance(**arrays(1), p_WA=np.zeros((2, 3))).p_WA is not None
-    with pytest.raises(ValueError, match=r"p_WA has shape \(3, 2\), expected \(k, 3\)"):
-        ClutterInstance(**arrays(1), p_WA=np.zeros((3, 2)))
-
-
-def test_translation_moves_objects_goal_and_apertures_and_nothing_else() -> None:
-    rng, offset = np.random.default_rng(0), np.array([0.5, -2.0, 0.0])
-    values = arrays(4) | {"p_WO": rng.uniform(size=(4, 3)), "yaw": rng.uniform(size=4)}
-    whole = ClutterInstance(**values, p_WG=rng.uniform(size=3), p_WA=rng.uniform(size=(2, 3)))
+def test_translation_moves_objects_goal_apertures_and_stems() -> None:
+    offset = np.array([0.5, -2.0, 0.1])
+    whole = replace(MIXED, stems=STEMS)
     moved = whole.translated(offset)
     for name in ("p_WO", "p_WG", "p_WA"):
         np.testing.assert_array_equal(getattr(moved, name), getattr(whole, name) + offset)
     for name in ("size", "yaw", "mass", "movable"):
         np.testing.assert_array_equal(getattr(moved, name), getattr(whole, name))
-    bare = ClutterInstance(**values).translated(offset)
-    assert bare.p_WG is None and bare.p_WA is None
+    assert moved.stems is not None
+    np.testing.assert_array_equal(moved.stems.p_WH, STEMS.p_WH + offset)
+    assert moved.stems.p_SL is STEMS.p_SL
+    bare = join().translated(offset)
+    assert bare.p_WG is bare.p_WA is bare.stems is None
 
 
-def test_only_movable_objects_are_put_elsewhere() -> None:
-    values = arrays(4) | {
-        "p_WO": np.arange(12.0).reshape(4, 3),
-        "movable": np.array([False, True, False, True]),
-    }
-    whole = ClutterInstance(**values)
-    moved = whole.with_objects_at(np.array([[7.0, 8.0], [9.0, 10.0]]))
-    np.testing.assert_array_equal(
-        moved.p_WO, [[0.0, 1.0, 2.0], [7.0, 8.0, 5.0], [6.0, 7.0, 8.0], [9.0, 10.0, 11.0]]
-    )
-    np.testing.assert_array_equal(whole.p_WO, np.arange(12.0).reshape(4, 3))
+def test_movable_objects_are_put_elsewhere_and_stems_spring_back() -> None:
+    moved = MIXED.with_objects_at(np.array([[7.0, 8.0], [9.0, 10.0]]))
+    np.testing.assert_array_equal(moved.p_WO, [[7.0, 8.0, 0.0], [3.0, 4.0, 0.0], [9.0, 10.0, 7.0]])
+    assert MIXED.p_WO[0, 0] == 1.0
+    springy = replace(MIXED, stems=STEMS)
+    assert springy.with_objects_at(np.full((2, 2), 0.3)) is springy
 
 
-def test_a_shape_that_the_scene_does_not_know_is_refused() -> None:
+def test_a_subset_has_its_objects_in_the_order_asked_for() -> None:
+    some = MIXED.subset(np.array([2, 0, 0]))
+    assert some.shape == ("box", "cylinder", "cylinder")
+    assert some.material == ("wood", "", "")
+    np.testing.assert_array_equal(some.p_WO, MIXED.p_WO[[2, 0, 0]])
+    np.testing.assert_array_equal(some.movable, True)
+
+
+def test_a_subset_of_stems_keeps_their_leaves() -> None:
+    np.testing.assert_array_equal(STEMS.fixed, [False, True])
+    some = STEMS.subset(np.array([False, True]))
+    assert some.num_stems == 1
+    np.testing.assert_array_equal(some.p_WH, STEMS.p_WH[1:])
+    np.testing.assert_array_equal(some.leaf_stem, [0, 0])
+    np.testing.assert_array_equal(some.p_SL, STEMS.p_SL[[0, 2]])
+
+
+def test_arrays_that_do_not_fit_are_refused() -> None:
+    for name, value in (
+        ("size", np.ones((2, 3))),
+        ("movable", np.ones(4, dtype=bool)),
+        ("p_WG", np.zeros(2)),
+        ("p_WA", np.zeros((3, 2))),
+    ):
+        with pytest.raises(ValueError, match=rf"{name} has shape .* expected"):
+            replace(MIXED, **{name: value})
     with pytest.raises(ValueError, match=r"unknown shapes \['cone'\]"):
-        ClutterInstance(**arrays(2) | {"shape": ("cone", "box")})
+        make_objects("cone", [0.1], [0.0, 0.0])
+    with pytest.raises(ValueError, match=r"length has shape \(3,\), expected \(2,\)"):
+        replace(STEMS, length=np.ones(3))
+    with pytest.raises(ValueError, match="leaf_stem must be from 0 to 1"):
+        replace(STEMS, leaf_stem=np.array([2, 0, 0]))

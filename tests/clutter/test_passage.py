@@ -13,8 +13,8 @@ from lic_drake.errors import ScenarioError
 from lic_drake.seeds import make_generator
 
 
-def sample(passage: PassageClutter, index: int = 0, stream: str = "training") -> ClutterInstance:
-    return passage.sample(make_generator(stream, "passage-clutter", index))
+def sample(passage: PassageClutter, index: int = 0) -> ClutterInstance:
+    return passage.sample(make_generator("training", "passage-clutter", index))
 
 
 def test_the_defaults_are_the_papers_passage() -> None:
@@ -76,13 +76,6 @@ def test_whatever_the_slope_the_gap_is_exact_and_the_goal_in_its_middle(
     assert (right @ across).max() == pytest.approx(-0.5 * gap)
 
 
-def test_an_index_always_gives_the_same_passage_and_another_one_gives_another() -> None:
-    passage = PassageClutter()
-    np.testing.assert_array_equal(sample(passage, 3).p_WO, sample(passage, 3).p_WO)
-    others = [sample(passage, 4), sample(passage, 3, "evaluation")]
-    assert all(np.all(sample(passage, 3).yaw != other.yaw) for other in others)
-
-
 def test_centres_and_slopes_are_uniform_and_independent() -> None:
     passage = PassageClutter()
     drawn = [sample(passage, index) for index in range(2000)]
@@ -98,14 +91,9 @@ def test_centres_and_slopes_are_uniform_and_independent() -> None:
     ("values", "message"),
     [
         ({"gap_m": 0.0}, "gap_m must be a positive number, got 0.0"),
-        ({"wall_length_m": -0.4}, "wall_length_m must be a positive number, got -0.4"),
-        ({"wall_width_m": float("nan")}, "wall_width_m must be a positive number, got nan"),
-        ({"wall_height_m": float("inf")}, "wall_height_m must be a positive number, got inf"),
-        ({"centre_from": [0.6]}, r"must be \[x, y\] in metres, got \[0.6\]"),
-        ({"centre_to": [0.6, float("inf")]}, r"must be \[x, y\] in metres.*inf"),
-        ({"min_slope_deg": 40.0}, "min_slope_deg <= max_slope_deg <= 90, got 40.0 and 35.0"),
-        ({"max_slope_deg": 91.0}, "got 5.0 and 91.0"),
-        ({"max_slope_deg": float("nan")}, "got 5.0 and nan"),
+        ({"centre_from": [0.6]}, r"centre_from must be 2 finite numbers, got \[0.6\]"),
+        ({"min_slope_deg": 40.0}, "min_slope_deg must not exceed max_slope_deg, got 40.0 and 35.0"),
+        ({"max_slope_deg": 91.0}, "max_slope_deg must be from -90 to 90, got 91.0"),
     ],
 )
 def test_a_value_that_cannot_be_used_is_named(values: dict[str, Any], message: str) -> None:

@@ -80,7 +80,7 @@ def test_the_robot_believes_what_it_saw(station: CameraStation) -> None:
     assert np.linalg.norm(starts.all_apertures[0] - board.aperture_centres()[0]) > 1e-4
     # Open are those that seem so, and all others have a cover.
     assert set(belief.index) == set(np.flatnonzero(look.apertures.probability_open > 0.5))
-    assert starts.instance.num_objects == len(board.bar_boxes()[0]) + 20 - len(belief.index)
+    assert starts.instance.num_objects == board.bare_board().num_objects + 20 - len(belief.index)
     x0 = starts.grid.x0
     np.testing.assert_allclose(
         starts.chance(x0),

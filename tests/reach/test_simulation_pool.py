@@ -66,7 +66,7 @@ def sleeping(environment: int, spares: int = 2) -> ClutterInstance:
         (sleeping(1), True),
         (sleeping(0, spares=4), False),
         (replace(sleeping(0), mass=np.full(8, 0.3)), False),
-        (sleeping(0).picked(np.r_[1:8]), False),
+        (sleeping(0).subset(np.r_[1:8]), False),
     ],
 )
 def test_what_a_diagram_can_be_used_for(instance: ClutterInstance, same: bool) -> None:

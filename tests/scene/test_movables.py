@@ -3,7 +3,7 @@ import pytest
 from pydrake.systems.analysis import ApplySimulatorConfig, SimulatorConfig
 from support.worlds import World, make_clutter, make_world
 
-from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.clutter.instance import ClutterInstance, make_objects
 from lic_drake.scene.movables import CARRIAGE_SHARE
 from lic_drake.scene.scene import SceneConfig
 
@@ -15,15 +15,7 @@ MASSES = MASS * (1.0 + CARRIAGE_SHARE * np.array([2.0, 1.0, 0.0]))
 
 
 def ball() -> ClutterInstance:
-    return ClutterInstance(
-        category="test",
-        shape=("sphere",),
-        size=np.array([[0.05, 0.0, 0.0]]),
-        p_WO=P_WO[None],
-        yaw=np.zeros(1),
-        mass=np.array([MASS]),
-        movable=np.ones(1, dtype=bool),
-    )
+    return make_objects("sphere", [0.05], P_WO, mass=MASS, movable=True)
 
 
 def world_of(time_step_s: float) -> World:

@@ -3,30 +3,19 @@
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from pydrake.geometry import Mesh, Role
 from pydrake.systems.framework import DiagramBuilder
 from support.mesh_package import write_drake_models
 
-from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.clutter.instance import join
 from lic_drake.robots.pr2 import Pr2Arm
 from lic_drake.scene.scene import Scene, SceneConfig, add_scene
 from lic_drake.show.meshes import wear_meshes
 from lic_drake.show.pr2_meshes import read_pr2_meshes
 
-EMPTY = ClutterInstance(
-    category="test",
-    shape=(),
-    size=np.zeros((0, 3)),
-    p_WO=np.zeros((0, 3)),
-    yaw=np.zeros(0),
-    mass=np.zeros(0),
-    movable=np.zeros(0, dtype=bool),
-)
-
 
 def dressed(package: Path | None) -> Scene:
-    scene = add_scene(DiagramBuilder(), Pr2Arm(), EMPTY, SceneConfig(), visuals=True)
+    scene = add_scene(DiagramBuilder(), Pr2Arm(), join(), SceneConfig(), visuals=True)
     wear_meshes(scene, read_pr2_meshes(package) if package else [])
     return scene
 

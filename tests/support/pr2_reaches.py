@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.clutter.instance import ClutterInstance, make_objects
 from lic_drake.reach.diagram import ReachDiagram, make_reach_diagram
 from lic_drake.reach.scenario import Scenario, load_scenario
 from lic_drake.robots.pr2 import Pr2Arm
@@ -20,16 +20,8 @@ ARM = pr2_of(SCENARIO)
 
 
 def spheres(*centres: np.ndarray, radius: float = 0.05, movable: bool = False) -> ClutterInstance:
-    n = len(centres)
-    return ClutterInstance(
-        category="test",
-        shape=("sphere",) * n,
-        size=np.tile([radius, 0.0, 0.0], (n, 1)),
-        p_WO=np.reshape(centres, (n, 3)),
-        yaw=np.zeros(n),
-        mass=np.full(n, 0.1),
-        movable=np.full(n, movable),
-    )
+    p_WO = np.reshape(centres, (-1, 3))
+    return make_objects("sphere", [radius], p_WO, mass=0.1, movable=movable)
 
 
 def felt(clutter: ClutterInstance, q: np.ndarray) -> tuple[ReachDiagram, np.ndarray]:

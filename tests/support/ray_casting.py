@@ -56,7 +56,6 @@ def draw_ball(
 
 def draw_instance(image: CameraImage, instance: ClutterInstance) -> None:
     """Draws a board with its covers."""
-    assert instance.material is not None
     known = {"wood": WOOD, "cardboard": CARDBOARD}
     colors = [known.get(name, OTHER) for name in instance.material]
     draw_boxes(image, instance.p_WO, instance.size, colors)

@@ -9,7 +9,7 @@ from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
-from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.clutter.instance import ClutterInstance, join, make_objects
 from lic_drake.control.tactile_sensor import TactileSensor
 from lic_drake.control.taxels import planar_taxels
 from lic_drake.robots.planar import planar_arm
@@ -19,51 +19,21 @@ ARM = planar_arm()
 LAYOUT = planar_taxels(ARM.skin)
 
 
-def make_clutter(*objects: ClutterInstance) -> ClutterInstance:
-    """Puts objects of `cylinder` and `box` together."""
-    return ClutterInstance(
-        category="test",
-        shape=tuple(name for item in objects for name in item.shape),
-        size=np.vstack([np.zeros((0, 3)), *(item.size for item in objects)]),
-        p_WO=np.vstack([np.zeros((0, 3)), *(item.p_WO for item in objects)]),
-        yaw=np.concatenate([np.zeros(0), *(item.yaw for item in objects)]),
-        mass=np.concatenate([np.zeros(0), *(item.mass for item in objects)]),
-        movable=np.concatenate([np.zeros(0, bool), *(item.movable for item in objects)]),
-    )
+make_clutter = join
 
 
 def cylinder(
     x: float, y: float, *, movable: bool = False, radius: float = 0.01, mass: float = 1.0
 ) -> ClutterInstance:
     """One upright cylinder of 0.2 m length."""
-    return _one("cylinder", (radius, 0.2, 0.0), x, y, 0.0, mass, movable)
+    return make_objects("cylinder", [radius, 0.2], [x, y], mass=mass, movable=movable)
 
 
 def box(
     x: float, y: float, edges: tuple[float, float, float], yaw: float = 0.0, movable: bool = False
 ) -> ClutterInstance:
     """One box of 1 kg."""
-    return _one("box", edges, x, y, yaw, 1.0, movable)
-
-
-def _one(
-    shape: str,
-    size: tuple[float, float, float],
-    x: float,
-    y: float,
-    yaw: float,
-    mass: float,
-    movable: bool,
-) -> ClutterInstance:
-    return ClutterInstance(
-        category="test",
-        shape=(shape,),
-        size=np.array([size]),
-        p_WO=np.array([[x, y, 0.0]]),
-        yaw=np.array([yaw]),
-        mass=np.array([mass]),
-        movable=np.array([movable]),
-    )
+    return make_objects("box", edges, [x, y], yaw=yaw, movable=movable)
 
 
 def corners(instance: ClutterInstance, i: int) -> np.ndarray:
