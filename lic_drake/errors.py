@@ -20,6 +20,10 @@ class LibraryError(LicError):
     """An experience library cannot be read or written."""
 
 
+class EstimateError(LicError):
+    """An estimator is unknown, not fitted yet, or was given unusable rows."""
+
+
 class ClusterError(LicError):
     """A cluster cannot be reached, or its workers cannot be used as they are."""
 

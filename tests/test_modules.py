@@ -105,7 +105,7 @@ def test_an_import_takes_less_than_a_blink(what: str) -> None:
     ("module", "heavy"),
     [
         ("lic_drake.clutter.registry", {"pydrake", "sklearn", "matplotlib", "pyarrow"}),
-        ("lic_drake.estimate.checks", {"pydrake", "sklearn", "matplotlib"}),
+        ("lic_drake.estimate.registry", {"pydrake", "sklearn", "matplotlib"}),
         ("lic_drake.experience.workers", {"pydrake", "numpy", "pyarrow", "sklearn"}),
         ("lic_drake.select.lic", {"sklearn", "matplotlib", "distributed"}),
         ("lic_drake.reach.rollout", {"sklearn", "matplotlib", "distributed"}),

@@ -9,12 +9,10 @@ import pytest
 from lic_drake.clutter import registry as clutter
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.clutter.registry import get_category, register_category
-from lic_drake.errors import LicError, ScenarioError
-from lic_drake.estimate import categories
+from lic_drake.errors import EstimateError, LicError, ScenarioError
+from lic_drake.estimate import features as categories
 from lic_drake.estimate import registry as estimate
-from lic_drake.estimate.categories import features_of, register_features
-from lic_drake.estimate.checks import EstimateError
-from lic_drake.estimate.features import PLANAR_LIC1
+from lic_drake.estimate.features import PLANAR_LIC1, features_of, register_features
 from lic_drake.estimate.nearest_neighbours import NearestNeighbours
 from lic_drake.estimate.registry import register_estimator
 from lic_drake.paths import models_dir

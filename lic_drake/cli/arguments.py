@@ -56,7 +56,7 @@ def add_method_argument(parser: argparse.ArgumentParser) -> None:
         "--method",
         default="gp",
         metavar="NAME",
-        help="strategy that selects: rnd, cost, knn, gp or gp-raw (default: %(default)s)",
+        help="strategy that selects: rnd, cost, knn or gp (default: %(default)s)",
     )
 
 

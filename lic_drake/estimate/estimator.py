@@ -1,91 +1,194 @@
-"""What every success estimator offers."""
+"""The interface of success estimators: scikit-learn's, with unclipped values and gradients."""
 
-from dataclasses import dataclass
-from typing import Protocol, Self, runtime_checkable
+from abc import ABC, abstractmethod
+from typing import Any, Self, cast
 
+import numpy as np
 from numpy.typing import ArrayLike
+from sklearn.base import BaseEstimator, ClassifierMixin, clone, is_classifier
+from sklearn.utils.validation import has_fit_parameter
 
+from lic_drake.errors import EstimateError
+from lic_drake.estimate.rows import (
+    check_queries,
+    check_rows,
+    check_weights,
+    feature_scale,
+    selection_folds,
+)
 from lic_drake.types import Vector
 
 
-@dataclass(frozen=True, kw_only=True)
-class Prediction:
-    """Estimates for n queries.
+class SuccessEstimator(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[misc]
+    """F(s, x0) of paper III-D: an estimate of P(success), with its gradient for Eq. (4).
+
+    It is a binary classifier of scikit-learn with classes 0 (failure) and 1 (success). A subclass
+
+    - keeps the arguments of its constructor, unchanged, under their own names, so that
+      `get_params`, `set_params` and `sklearn.base.clone` work,
+    - implements `_fit` and `_values`, which get arrays that were checked already,
+    - may override `_value_and_gradient` where it knows its gradient, and `_settled` where `fit`
+      chooses settings that later rows should not change.
 
     Attributes:
-        probability: Estimated probability of success, shape (n,), within [0, 1].
-        spread: Standard deviation of that estimate, shape (n,); each estimator says of what.
+        gradient_step: Half width of the numerical gradient's central difference, in standard
+            deviations of a feature. It is wide enough for estimates that are flat between steps:
+            the difference is the slope of the estimate averaged over this width.
+        classes_: 0 and 1.
+        n_features_in_: Number of features d of the rows.
+        scale_: Standard deviation of each feature, shape (d,).
     """
 
-    probability: Vector
-    spread: Vector
+    gradient_step: float = 0.2
 
-
-class Predictor(Protocol):
-    """An estimate of P(success) that can be fitted and asked, as cross-validation needs it."""
-
-    def fit(self, Z: ArrayLike, f: ArrayLike, environment: ArrayLike | None = None) -> Self:
+    def fit(
+        self,
+        X: ArrayLike,
+        y: ArrayLike,
+        groups: ArrayLike | None = None,
+        sample_weight: ArrayLike | None = None,
+    ) -> Self:
         """Learns from rows and returns itself.
 
         Args:
-            Z: Features, shape (n, d), see `lic_drake.estimate.features`.
-            f: Successes, shape (n,), each 0 or 1.
-            environment: Index of each row's environment, shape (n,). Reaches in one environment
+            X: Features, shape (n, d), see `lic_drake.estimate.features`.
+            y: Successes, shape (n,), each 0 or 1.
+            groups: Number of each row's environment, shape (n,). Reaches in one environment
                 succeed and fail together; an estimator that knows them smooths more.
+            sample_weight: How many reaches each row counts as, shape (n,); one by default.
 
         Raises:
             EstimateError: The rows are unusable.
         """
-        ...
+        X, y = check_rows(X, y)
+        selection_folds(groups, len(y))  # Refuses groups of another length.
+        known = None if groups is None else np.asarray(groups)
+        return self._learn(X, y, known, check_weights(sample_weight, len(y)))
 
-    def predict(self, Z: ArrayLike) -> Prediction:
-        """Estimates P(success) for queries Z, shape (n, d).
+    def conditioned_on(
+        self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None
+    ) -> Self:
+        """Returns a new estimator with the settings that `fit` chose and other rows.
+
+        Estimators that choose no settings are fitted anew.
+
+        Args:
+            X: Features, shape (n, d).
+            y: Successes, shape (n,), each 0 or 1.
+            sample_weight: How many reaches each row counts as, shape (n,); one by default.
+
+        Raises:
+            EstimateError: Not fitted yet, or the rows are unusable.
+        """
+        self._check_fitted()
+        return self._settled().fit(X, y, sample_weight=sample_weight)
+
+    def values(self, X: ArrayLike) -> Vector:
+        """Returns the estimates for queries X, shape (n, d), not clipped into [0, 1]: shape (n,).
+
+        A clipped estimate would be flat where an optimiser needs to climb, and tie the best starts
+        with each other.
 
         Raises:
             EstimateError: Not fitted yet, or queries that do not fit.
         """
-        ...
+        self._check_fitted()
+        return self._values(check_queries(X, self.n_features_in_))
 
-
-class SuccessEstimator(Predictor, Protocol):
-    """F(s, x0) of paper III-D with its gradient, for the optimisation of Eq. (4).
-
-    Estimates are not clipped into [0, 1] here: a clipped one is flat where an optimiser needs to
-    climb, and would tie the best starts with each other.
-    """
-
-    def values(self, Z: ArrayLike) -> Vector:
-        """Returns the estimates for queries Z, shape (n, d): shape (n,).
-
-        Many at a time: candidates of one situation take a few milliseconds in all.
-
-        Raises:
-            EstimateError: Not fitted yet, or queries that do not fit.
-        """
-        ...
-
-    def value_and_gradient(self, z: ArrayLike) -> tuple[float, Vector]:
-        """Returns the estimate at z, shape (d,), and its gradient by z, shape (d,).
+    def value_and_gradient(self, x: ArrayLike) -> tuple[float, Vector]:
+        """Returns the estimate at x, shape (d,), not clipped, and its gradient by x, shape (d,).
 
         Raises:
             EstimateError: Not fitted yet, or a query that does not fit.
         """
-        ...
+        self._check_fitted()
+        return self._value_and_gradient(check_queries(np.atleast_2d(x), self.n_features_in_)[0])
+
+    def predict_proba(self, X: ArrayLike) -> Vector:
+        """Returns the probabilities of failure and success for queries X, shape (n, 2)."""
+        success = np.clip(self.values(X), 0.0, 1.0)
+        return np.column_stack([1.0 - success, success])
+
+    def predict(self, X: ArrayLike) -> Vector:
+        """Returns the likelier outcome of queries X, 0 or 1, shape (n,)."""
+        return (self.values(X) >= 0.5).astype(np.float64)
+
+    @abstractmethod
+    def _fit(self, X: Vector, y: Vector, groups: Any, weight: Vector) -> None:
+        """Learns from checked rows; see `fit`. `groups` is None or an array, shape (n,)."""
+
+    @abstractmethod
+    def _values(self, X: Vector) -> Vector:
+        """Returns unclipped estimates of checked queries; see `values`."""
+
+    def _value_and_gradient(self, x: Vector) -> tuple[float, Vector]:
+        """Returns value and gradient at a checked query, by default from central differences."""
+        h = self.gradient_step * self.scale_
+        values = self._values(np.vstack([x, x + np.diag(h), x - np.diag(h)]))
+        up, down = np.split(values[1:], 2)
+        return float(values[0]), (up - down) / (2.0 * h)
+
+    def _settled(self) -> Self:
+        """Returns an unfitted estimator with the settings that `fit` chose."""
+        return cast(Self, clone(self))
+
+    def _learn(self, X: Vector, y: Vector, groups: Any, weight: Vector) -> Self:
+        """Fits to rows that were checked already, and returns itself."""
+        self._fit(X, y, groups, weight)
+        self.classes_ = np.array([0.0, 1.0])
+        self.n_features_in_ = X.shape[1]
+        self.scale_ = feature_scale(X)
+        return self
+
+    def _check_fitted(self) -> None:
+        if not hasattr(self, "n_features_in_"):
+            raise EstimateError(f"this {type(self).__name__} has no rows yet; call fit(X, y) first")
+
+    def __sklearn_tags__(self) -> Any:
+        tags = super().__sklearn_tags__()
+        tags.classifier_tags.multi_class = False
+        return tags
 
 
-@runtime_checkable
-class UpdatableEstimator(SuccessEstimator, Protocol):
-    """An estimator that goes on learning: what it learned from before is kept (paper VII)."""
+def from_sklearn(model: Any, gradient_step: float = 0.2) -> "SklearnEstimator":
+    """Returns a success estimator that asks a classifier or regressor of scikit-learn.
 
-    def update(self, Z: ArrayLike, f: ArrayLike, weight: ArrayLike = 1.0) -> Self:
-        """Takes further rows in and returns itself; its settings stay as `fit` chose them.
+    Args:
+        model: The unfitted model, for instance a `HistGradientBoostingClassifier` or a `Pipeline`.
+            A classifier's estimate is its probability of class 1, a regressor's its prediction.
+        gradient_step: See `SuccessEstimator`; small for a smooth model.
+    """
+    return SklearnEstimator(model, gradient_step)
 
-        Args:
-            Z: Features, shape (n, d).
-            f: Successes, shape (n,), each 0 or 1.
-            weight: How many of the reaches of `fit` a row counts as, one number or shape (n,).
 
-        Raises:
-            EstimateError: Not fitted yet, or the rows or weights are unusable.
-        """
-        ...
+class SklearnEstimator(SuccessEstimator):
+    """See `from_sklearn`. If all reaches ended alike, that outcome is the estimate.
+
+    Attributes:
+        model: The unfitted model; `fit` works on a clone.
+        model_: The fitted one; None if all reaches ended alike.
+    """
+
+    def __init__(self, model: Any, gradient_step: float = 0.2) -> None:
+        self.model = model
+        self.gradient_step = gradient_step
+
+    def _fit(self, X: Vector, y: Vector, groups: Any, weight: Vector) -> None:
+        options = {}
+        if np.any(weight != weight[0]):
+            if not has_fit_parameter(self.model, "sample_weight"):
+                raise EstimateError(
+                    f"{type(self.model).__name__} cannot weight its rows, and the library has rows"
+                    " of different weights; choose a model whose fit takes sample_weight"
+                )
+            options["sample_weight"] = weight
+        self._constant = float(y[0])
+        alike = bool(np.all(y == y[0]))
+        self.model_ = None if alike else clone(self.model).fit(X, y, **options)
+
+    def _values(self, X: Vector) -> Vector:
+        if self.model_ is None:
+            return np.full(len(X), self._constant)
+        if is_classifier(self.model_):
+            return np.asarray(self.model_.predict_proba(X)[:, 1], dtype=np.float64)
+        return np.asarray(self.model_.predict(X), dtype=np.float64)

@@ -1,15 +1,20 @@
-"""From records, goals and starts to feature vectors z = (situation s, initial condition x0)."""
+"""From records, goals and starts to feature vectors x, and the features of each category.
+
+A new category calls `register_features` beside `lic_drake.clutter.registry.register_category`.
+"""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lic_drake.estimate.checks import EstimateError
+from lic_drake.errors import EstimateError
 from lic_drake.experience.second_reach import FIRST_PREFIX, SHOWN
-from lic_drake.types import Vector
+from lic_drake.registry import Registry
+from lic_drake.types import BoolVector, IntVector, Vector
 
 _GOAL = ("goal_x", "goal_y", "goal_z")
 _IN_PLANE = ("start_x", "start_y", "start_phi")
@@ -17,31 +22,48 @@ _IN_SPACE = ("start_x", "start_y", "start_z", "start_qw", "start_qx", "start_qy"
 _START = (*_IN_PLANE, *_IN_SPACE[2:])
 _OBSERVED = tuple(FIRST_PREFIX + name for name in SHOWN)
 
+_POSITIONS = tuple((f"{what}_x", f"{what}_y", f"{what}_z") for what in ("goal", "start", "final"))
+AXIS_OF_POSITION = {name: axis for names in _POSITIONS for axis, name in enumerate(names)}
+"""The columns that are positions, with their axes: told in R they are smaller by that component of
+b0. Angles and velocities are the same in R as in W."""
+
+_DECIMALS = 9  # Differences of the same numbers in another order are the same feature, metres.
+
 
 @dataclass(frozen=True, kw_only=True)
 class ExperienceRows:
     """Past reaches as an estimator takes them.
 
     Attributes:
-        Z: Features, shape (n, d).
-        f: Successes, shape (n,), each 0 or 1.
-        environment: Number that stands for each reach's environment, shape (n,).
-        weight: How many simulated reaches each counts as, shape (n,), or one number for all.
+        X: Features, shape (n, d).
+        y: Successes, shape (n,), each 0 or 1.
+        groups: Number of each reach's environment, shape (n,).
+        weight: How many simulated reaches each counts as, shape (n,).
+        simulated: Whether each comes from simulation, shape (n,).
     """
 
-    Z: Vector
-    f: Vector
-    environment: NDArray[np.int64]
-    weight: Vector | float = 1.0
+    X: Vector
+    y: Vector
+    groups: IntVector
+    weight: Vector
+    simulated: BoolVector
+
+    def join(self, other: "ExperienceRows") -> "ExperienceRows":
+        """Returns these rows, then the other ones; equal groups stay equal."""
+        return ExperienceRows(
+            **{
+                field.name: np.concatenate([getattr(self, field.name), getattr(other, field.name)])
+                for field in fields(self)
+            }
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
 class FeatureMap:
-    """Which columns of the records make up z: first the situation, then the decision.
+    """Which columns of the records make up x: first the situation, then the decision.
 
     Positions are those in the robot's frame R, which has the axes of the world W and its origin
-    at b0, the base's place and the torso's height: the translation T_b0 of paper Eq. (3). Angles
-    and velocities are the same in both.
+    at b0, the base's place and the torso's height: the translation T_b0 of paper Eq. (3).
 
     Attributes:
         goal: Columns of the goal p_WG, a part of goal_x, goal_y, goal_z, metres.
@@ -50,11 +72,14 @@ class FeatureMap:
             start_qw, start_qx, start_qy, start_qz, metres and radians.
         observed: Columns of what the first reach showed, for LIC-2: "first_" before names of
             `lic_drake.experience.second_reach.SHOWN`, metres, radians and m/s.
+        relative: Whether each goal column is replaced by its difference from the start: the first
+            start column minus the first goal column, and so on. LIC-1 only.
     """
 
     goal: tuple[str, ...]
     start: tuple[str, ...]
     observed: tuple[str, ...] = ()
+    relative: bool = False
 
     def __post_init__(self) -> None:
         for kind, names, known in (
@@ -69,6 +94,11 @@ class FeatureMap:
                 )
         if "start_phi" in self.start and self.in_space:
             raise EstimateError(f"start features are of the plane or of space, got {self.start}")
+        if self.relative and (self.observed or len(self.goal) > len(self.start)):
+            raise EstimateError(
+                "features relative to the goal need a start column for each goal column and no"
+                f" observed ones, got {self.columns}"
+            )
 
     @property
     def in_space(self) -> bool:
@@ -76,19 +106,33 @@ class FeatureMap:
         return not set(self.start) <= set(_IN_PLANE)
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the d features, in the order of z."""
+    def columns(self) -> tuple[str, ...]:
+        """The d columns that x is made of: goal, observed, start."""
         return self.goal + self.observed + self.start
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the d features, in the order of x."""
+        if not self.relative:
+            return self.columns
+        return tuple(f"{e} - {g}" for e, g in zip(self.start, self.goal, strict=False)) + self.start
+
+    @property
     def situation(self) -> slice:
-        """The part of z that is given."""
+        """The part of the columns that is given."""
         return slice(0, len(self.goal) + len(self.observed))
 
     @property
     def decision(self) -> slice:
-        """The part of z that the robot chooses."""
-        return slice(self.situation.stop, len(self.names))
+        """The part of the columns that the robot chooses."""
+        return slice(self.situation.stop, len(self.columns))
+
+    @property
+    def goal_matrix(self) -> Vector:
+        """The matrix, shape (k, d), that takes x to the goal in R."""
+        # What replaces the goal by its difference from the start also brings it back.
+        matrix: Vector = self._matrix[: len(self.goal)]
+        return matrix
 
     def rows(self, columns: Mapping[str, NDArray[Any]]) -> ExperienceRows:
         """Returns the rows of a library.
@@ -98,13 +142,13 @@ class FeatureMap:
 
         Args:
             columns: Arrays of equal length named as the fields of `ReachRecord`; with observed
-                features those of `lic_drake.experience.second_reach.pair_reaches`. Without
-                base_x, base_y and torso they are 0, without weight it is 1.
+                features those of `lic_drake.experience.second_reach.pair_reaches`. Defaults: 0 for
+                base_x, base_y and torso, 1 for weight, "simulation" for source.
 
         Raises:
             EstimateError: A column is missing.
         """
-        needed = (*self.names, "success", "stream", "environment")
+        needed = (*self.columns, "success", "stream", "environment")
         missing = [name for name in needed if name not in columns]
         if missing:
             raise EstimateError(
@@ -112,19 +156,20 @@ class FeatureMap:
             )
         # Environments of different streams share indices.
         streams, stream = np.unique(columns["stream"].astype(str), return_inverse=True)
-        environment = columns["environment"].astype(np.int64) * len(streams) + stream
-        origin = np.zeros(len(environment))
-        b0 = np.column_stack([columns.get(name, origin) for name in ("base_x", "base_y", "torso")])
-        Z = np.column_stack([np.asarray(columns[name], dtype=float) for name in self.names])
+        groups = columns["environment"].astype(np.int64) * len(streams) + stream
+        count = len(groups)
+        b0 = [columns.get(name, np.zeros(count)) for name in ("base_x", "base_y", "torso")]
+        values = np.column_stack([np.asarray(columns[name], dtype=float) for name in self.columns])
         return ExperienceRows(
-            Z=Z - b0 @ self._base_selection(self.names).T,
-            f=np.asarray(columns["success"], dtype=float),
-            environment=environment,
-            weight=np.asarray(columns["weight"], dtype=float) if "weight" in columns else 1.0,
+            X=self._features(values - np.column_stack(b0) @ _base_part(self.columns).T),
+            y=np.asarray(columns["success"], dtype=float),
+            groups=groups,
+            weight=np.asarray(columns.get("weight", np.ones(count)), dtype=float),
+            simulated=columns.get("source", np.full(count, "simulation")) == "simulation",
         )
 
     def join(self, p_RG: ArrayLike, x0: ArrayLike, observed: ArrayLike | None = None) -> Vector:
-        """Returns z, shape (..., d).
+        """Returns x, shape (..., d).
 
         Args:
             p_RG: Goal in the robot's frame, shape (..., 3), metres.
@@ -140,13 +185,13 @@ class FeatureMap:
         seen = np.zeros(0) if observed is None else np.asarray(observed, dtype=float)
         if seen.shape[-1:] != (len(self.observed),):
             raise EstimateError(
-                f"z needs {len(self.observed)} observed features, got shape {seen.shape}"
+                f"x needs {len(self.observed)} observed features, got shape {seen.shape}"
             )
         goal = p_RG[..., [_GOAL.index(name) for name in self.goal]]
         start = x0[..., self._start_indices()]
         shape = np.broadcast_shapes(goal.shape[:-1], seen.shape[:-1], start.shape[:-1])
         parts = [np.broadcast_to(part, shape + part.shape[-1:]) for part in (goal, seen, start)]
-        return np.concatenate(parts, axis=-1)
+        return self._features(np.concatenate(parts, axis=-1))
 
     def observation(self, first: Mapping[str, float], b0: ArrayLike = (0.0, 0.0, 0.0)) -> Vector:
         """Returns the observed features in the frame of a robot about to make its second reach.
@@ -169,27 +214,48 @@ class FeatureMap:
                 f"the first reach shows no {self.observed[np.argmin(np.isfinite(seen))]}, as if it"
                 " never began; choose the second start as a first one"
             )
-        moved = np.asarray(b0, dtype=float) @ self._base_selection(self.observed).T
-        observed: Vector = np.array(seen) - moved
+        observed: Vector = (
+            np.array(seen) - np.asarray(b0, dtype=float) @ _base_part(self.observed).T
+        )
         return observed
 
     def gradient_by_x0(self, gradient: Vector) -> Vector:
-        """Returns a gradient by x0, shape (3,) or in space (7,), from one by z, shape (d,).
+        """Returns a gradient by x0, shape (3,) or in space (7,), from one by x, shape (d,).
 
         Components of x0 that are no feature get zero.
         """
         by_x0 = np.zeros(len(self._pose_names))
-        by_x0[self._start_indices()] = gradient[self.decision]
+        by_x0[self._start_indices()] = self._by_columns(gradient)[self.decision]
         return by_x0
 
     def gradient_by_base(self, gradient: Vector) -> Vector:
-        """Returns a gradient by b0 = (x, y, torso), shape (3,), from one by z, shape (d,).
+        """Returns a gradient by b0 = (x, y, torso), shape (3,), from one by x, shape (d,).
 
-        Goal, first reach and start stand still in the world, so that every position in z moves
+        Goal, first reach and start stand still in the world, so that each position told in R moves
         by minus what the base moves.
         """
-        by_base: Vector = -(self._base_selection(self.names).T @ gradient)
+        by_base: Vector = -(_base_part(self.columns).T @ self._by_columns(gradient))
         return by_base
+
+    def _features(self, values: Vector) -> Vector:
+        """Returns x from the columns' values in R, both of shape (..., d)."""
+        if not self.relative:
+            return values
+        features: Vector = np.round(values @ self._matrix.T, _DECIMALS)
+        return features
+
+    def _by_columns(self, gradient: Vector) -> Vector:
+        """Returns the gradient by the columns from one by x, both of shape (d,)."""
+        return self._matrix.T @ gradient if self.relative else gradient
+
+    @cached_property
+    def _matrix(self) -> Vector:
+        """The matrix, shape (d, d), that takes the columns to x."""
+        matrix = np.eye(len(self.columns))
+        if self.relative:
+            for k in range(len(self.goal)):
+                matrix[k, k], matrix[k, self.decision.start + k] = -1.0, 1.0
+        return matrix
 
     def _start_indices(self) -> list[int]:
         return [self._pose_names.index(name) for name in self.start]
@@ -198,18 +264,94 @@ class FeatureMap:
     def _pose_names(self) -> tuple[str, ...]:
         return _IN_SPACE if self.in_space else _IN_PLANE
 
-    @staticmethod
-    def _base_selection(names: tuple[str, ...]) -> Vector:
-        """Returns the matrix that takes b0 out of features, shape (d, 3)."""
-        moved = [[name.endswith(axis) for axis in ("_x", "_y", "_z")] for name in names]
-        return np.array(moved, dtype=float).reshape(-1, 3)
+
+def _base_part(columns: tuple[str, ...]) -> Vector:
+    """Returns the matrix, shape (d, 3), that takes b0 to what it adds to positions in W."""
+    part = np.zeros((len(columns), 3))
+    for row, name in enumerate(columns):
+        axis = AXIS_OF_POSITION.get(name.removeprefix(FIRST_PREFIX))
+        if axis is not None:
+            part[row, axis] = 1.0
+    return part
 
 
 PLANAR_LIC1 = FeatureMap(goal=("goal_x", "goal_y"), start=("start_y", "start_phi"))
 """LIC-1 in the plane; x is the same all along the start line, so it is no feature."""
 
-SPACE_LIC1 = FeatureMap(goal=("goal_y", "goal_z"), start=("start_y", "start_z", "start_qx"))
+SPACE_LIC1 = FeatureMap(goal=("goal_y", "goal_z"), start=("start_y", "start_z"), relative=True)
 """LIC-1 in space, where tools start in a plane across x, point along it, and goals lie in another.
 
-Of the quaternion only the roll about x is then left, and the sine of half its angle says it all.
+Whether the PR2 comes to a goal depends first of all on how far the goal lies aside of the aperture
+through which it reaches, and a kernel with a scale for each feature can say so only if this
+difference is a feature: the process's chosen start succeeds for 183 of 480 held-out goals instead
+of 163 (notebooks/results/ablation/space_features.md). The roll is no feature: where the aperture
+is says which one the arm takes.
 """
+
+
+@dataclass(frozen=True, kw_only=True)
+class CategoryFeatures:
+    """What the robot knows before its first and second reach in a category (paper IV-A).
+
+    Attributes:
+        first: Features of LIC-1: goal and start.
+        second: Features of LIC-2: also what the first reach showed, the paper's o. None: the
+            category has no LIC-2, and further starts are LIC-1's best away from the failed ones.
+    """
+
+    first: FeatureMap
+    second: FeatureMap | None
+
+
+_CATEGORIES: Registry[CategoryFeatures] = Registry("category", EstimateError)
+
+# The paper's x0': in the plane a start is its place on the line and its direction.
+_FIRST_START = ("first_start_y", "first_start_phi")
+
+
+def register_features(
+    name: str, first: FeatureMap = PLANAR_LIC1, observed: tuple[str, ...] | None = _FIRST_START
+) -> None:
+    """Registers the features of a category.
+
+    Args:
+        name: The clutter category.
+        first: Features of LIC-1; by default those of the plane.
+        observed: What LIC-2 has besides, see `FeatureMap.observed`; by default where the first
+            reach started. None: the category has no LIC-2.
+
+    Raises:
+        EstimateError: A feature is unknown, or the category has other features already.
+    """
+    second = None if observed is None else replace(first, observed=observed, relative=False)
+    features = CategoryFeatures(first=first, second=second)
+    if _CATEGORIES.entries.get(name, features) != features:
+        raise EstimateError(
+            f"the category {name!r} has other features already; choose another name for yours"
+        )
+    _CATEGORIES.register(name, features)
+
+
+def features_of(category: str) -> CategoryFeatures:
+    """Returns the features of a category.
+
+    Raises:
+        EstimateError: The category is unknown.
+    """
+    if category not in _CATEGORIES.names():
+        raise EstimateError(
+            f"no features are registered for the category {category!r}, only for"
+            f" {', '.join(_CATEGORIES.names())}; call register_features"
+        )
+    return _CATEGORIES.get(category)
+
+
+register_features("cylinder-clutter", observed=(*_FIRST_START, "first_final_x", "first_final_y"))
+register_features("passage-clutter", observed=(*_FIRST_START, "first_final_vx", "first_final_vy"))
+register_features("cylinder-aperture-clutter")
+# A failure behind a board tells little but that the first choice was wrong: LIC-1 away from the
+# failed start succeeded in 20 of 297 second attempts (K-NN 28 of 312), LIC-2 from local rows in 6
+# (22), and LIC-2 with LIC-1's estimate as a feature in 15 (25)
+# (notebooks/results/ablation/space_features.md).
+register_features("sphere-aperture-clutter", SPACE_LIC1, observed=None)
+register_features("foliage-aperture-clutter", SPACE_LIC1, observed=None)

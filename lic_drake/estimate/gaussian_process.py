@@ -1,176 +1,288 @@
-"""Gaussian-process regression of the success probability (paper III-D)."""
+"""Gaussian-process regression of the success probability (paper III-D).
 
-from dataclasses import replace
-from typing import Self
+The kernel is the absolute exponential exp(-sum_i theta_i |d_i|): its distance is the weighted L1
+norm. (A Matern kernel with nu = 1/2 uses the L2 norm and is another model.) It has a kink wherever
+a feature equals that of a training row. The model of the rows is y ~ N(mu 1, C) with
+C = s R(theta) + diag(noise) + tau I, the correlation R, a constant mean mu (its
+generalised-least-squares value), and known noise.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any, Self, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.lapack import dpotri
+from scipy.optimize import minimize
+from scipy.spatial.distance import cdist
+from sklearn.base import clone
 from threadpoolctl import threadpool_limits
 
-from lic_drake.estimate.averaging import AveragedRows, average_rows, reach_variance
-from lic_drake.estimate.checks import EstimateError, checked_queries, checked_rows, checked_weights
-from lic_drake.estimate.estimator import Prediction
-from lic_drake.estimate.folds import selection_folds
-from lic_drake.estimate.likelihood import Hyperparameters, fit_hyperparameters
-from lic_drake.estimate.posterior import Posterior, condition
+from lic_drake.errors import EstimateError
+from lic_drake.estimate.estimator import SuccessEstimator
+from lic_drake.estimate.rows import (
+    AveragedRows,
+    average_rows,
+    feature_scale,
+    reach_variance,
+    selection_folds,
+)
 from lic_drake.seeds import make_generator
-from lic_drake.types import Vector
+from lic_drake.types import IntVector, Vector
 
 _DESIGN_EFFECTS = (1.0, 2.0, 4.0, 8.0, 16.0)
 # A matrix of that many rows takes half a gigabyte. The search for settings inverts hundreds.
 _MAX_ROWS = 8000
 _MAX_SETTINGS_ROWS = 1000
+_MAX_SEARCH_ROWS = 300
+# Bounds of theta are per standard deviation of a feature: from nearly a straight line through
+# all rows to rows that tell nothing about each other.
+_BOUNDS = {"theta": (1e-3, 10.0), "signal": (1e-4, 4.0), "floor": (1e-6, 0.25)}
+_THETA_STARTS = (0.05, 0.3, 1.5)
 
 
-class GaussianProcess:
-    """An exact GP with constant mean, L1 kernel and binomial noise; satisfies `SuccessEstimator`.
-
-    Scales, signal variance and noise floor maximise the marginal likelihood, which takes the
-    noise of all reaches as independent. Reaches in one environment are not: a cylinder in the way
-    spoils many of them, and the likelihood reads such luck as surface. So the noise is then
-    multiplied by the factor (the design effect of cluster samples) that best predicts environments
-    that were held out.
-
-    The spread is the posterior standard deviation of the surface, the uncertainty of the mean
-    included, the noise floor not.
+@dataclass(frozen=True, kw_only=True)
+class Hyperparameters:
+    """The prior and the noise of a process.
 
     Attributes:
-        average: Whether rows of the same features are averaged first. The paper's software
-            refused duplicate inputs, so a library of several environments had to be averaged,
-            or jittered.
+        theta: Decay of the correlation per unit of each feature, shape (d,).
+        signal_variance: Prior variance s of the success probability around its mean.
+        noise_floor: Variance tau of a row beyond binomial noise and smooth surface.
+        reach_variance: Noise variance of a single reach; a row of n reaches has the n-th part.
     """
 
-    def __init__(
-        self, *, average: bool = True, hyperparameters: Hyperparameters | None = None
-    ) -> None:
-        """Sets up an estimator.
+    theta: Vector
+    signal_variance: float
+    noise_floor: float
+    reach_variance: float
 
-        Args:
-            average: See the class.
-            hyperparameters: Taken as they are; by default `fit` chooses them.
-        """
-        self.average = average
-        self._given = hyperparameters
-        self._posterior: Posterior | None = None
+    def noise(self, count: Vector) -> Vector:
+        """Returns the noise variance of rows with these numbers of reaches, shape (m,)."""
+        return self.reach_variance / count + self.noise_floor
 
-    @property
-    def hyperparameters(self) -> Hyperparameters:
-        """The hyper-parameters in use.
 
-        Raises:
-            EstimateError: Neither given nor fitted yet.
-        """
-        return self._fitted().hyperparameters if self._given is None else self._given
+class GaussianProcess(SuccessEstimator):
+    """An exact GP with constant mean, L1 kernel and binomial noise, on averaged rows.
 
-    def fit(self, Z: ArrayLike, f: ArrayLike, environment: ArrayLike | None = None) -> Self:
-        """Learns from features Z, shape (n, d), and successes f, shape (n,); see `Predictor`."""
-        Z, f = checked_rows(Z, f)
-        hyperparameters = self._given
+    Scales, signal variance and noise floor maximise the marginal likelihood, which assumes that
+    the noise of all reaches is independent. Reaches in one environment are not: a cylinder in the
+    way spoils many of them, and the likelihood reads such luck as surface. So the noise is then
+    multiplied by the factor (the design effect of cluster samples) that best predicts held-out
+    environments. Rows of equal features are averaged first, as the paper's software refused
+    duplicate inputs.
+
+    Attributes:
+        hyperparameters: Taken as they are; None: `fit` chooses them.
+        hyperparameters_: Those in use.
+    """
+
+    def __init__(self, hyperparameters: Hyperparameters | None = None) -> None:
+        self.hyperparameters = hyperparameters
+
+    def _fit(self, X: Vector, y: Vector, groups: Any, weight: Vector) -> None:
+        rows = average_rows(X, y, weight)
+        if len(rows.X) > _MAX_ROWS:
+            raise EstimateError(
+                f"an exact Gaussian process takes at most {_MAX_ROWS} distinct rows, got"
+                f" {len(rows.X)}; use the estimator 'knn'"
+            )
+        chosen = self.hyperparameters
         # The matrices are small: OpenBLAS threads that wait for a busy core made a fit of two
         # seconds take minutes.
         with threadpool_limits(limits=1, user_api="blas"):
-            if hyperparameters is None:
-                fold = selection_folds(environment, len(f))
-                hyperparameters = self._choose_hyperparameters(Z, f, fold)
-            rows = self._rows(Z, f)
-            _refuse_too_many(len(rows.Z))
-            self._posterior = condition(rows, hyperparameters)
-        return self
+            if chosen is None:
+                chosen = _choose_hyperparameters(X, y, weight, selection_folds(groups, len(y)))
+            self._posterior = condition(rows, chosen)
+        self.hyperparameters_ = chosen
 
-    def update(self, Z: ArrayLike, f: ArrayLike, weight: ArrayLike = 1.0) -> Self:
-        """Takes further rows in; see `UpdatableEstimator`.
+    def _settled(self) -> Self:
+        return cast(Self, clone(self).set_params(hyperparameters=self.hyperparameters_))
 
-        A row of weight w has the w-th part of a reach's noise variance. Hyper-parameters stay, and
-        the posterior is that of all rows at once. Rows of the same features are averaged among
-        those of one update, not with earlier ones: the noise floor counts once for each.
-        """
-        posterior = self._fitted()
-        Z, f = checked_rows(Z, f)
-        checked_queries(Z, posterior.Z.shape[1])
-        rows = self._rows(Z, f, checked_weights(weight, len(f)))
-        _refuse_too_many(len(posterior.Z) + len(rows.Z))
-        with threadpool_limits(limits=1, user_api="blas"):
-            self._posterior = posterior.extended(rows)
-        return self
+    def _values(self, X: Vector) -> Vector:
+        return self._posterior.mean(X)
 
-    def conditioned_on(
-        self, Z: ArrayLike, f: ArrayLike, weight: ArrayLike = 1.0
-    ) -> "GaussianProcess":
-        """Returns a process with these hyper-parameters that has seen other rows only."""
-        other = GaussianProcess(average=self.average, hyperparameters=self.hyperparameters)
-        Z, f = checked_rows(Z, f)
-        rows = other._rows(Z, f, checked_weights(weight, len(f)))
-        _refuse_too_many(len(rows.Z))
-        with threadpool_limits(limits=1, user_api="blas"):
-            other._posterior = condition(rows, self.hyperparameters)
-        return other
+    def _value_and_gradient(self, x: Vector) -> tuple[float, Vector]:
+        """At a kink the gradient is the mean of both sides'."""
+        return self._posterior.mean_and_gradient(x)
 
-    def predict(self, Z: ArrayLike) -> Prediction:
-        """Estimates P(success) for queries Z, shape (n, d); see `Predictor`."""
-        posterior = self._fitted()
-        Z = checked_queries(Z, posterior.Z.shape[1])
-        return Prediction(
-            probability=np.clip(posterior.mean(Z), 0.0, 1.0),
-            spread=posterior.standard_deviation(Z),
+
+@dataclass(frozen=True, kw_only=True)
+class Posterior:
+    """The process given m rows.
+
+    Attributes:
+        X: Features, shape (m, d).
+        hyperparameters: Of the prior and the noise.
+        prior_mean: Generalised-least-squares mean mu.
+        alpha: C^-1 (rate - mu), shape (m,); C is the covariance of the rows, noise included.
+    """
+
+    X: Vector
+    hyperparameters: Hyperparameters
+    prior_mean: float
+    alpha: Vector
+
+    def mean(self, X: Vector) -> Vector:
+        """Returns the posterior mean for queries X, shape (n, d): shape (n,)."""
+        correlation = l1_correlation(self.X, X, self.hyperparameters.theta)
+        mean: Vector = self.prior_mean + self.alpha @ (
+            self.hyperparameters.signal_variance * correlation
         )
+        return mean
 
-    def values(self, Z: ArrayLike) -> Vector:
-        """Returns the posterior means at queries Z, shape (n, d): shape (n,)."""
-        posterior = self._fitted()
-        return posterior.mean(checked_queries(Z, posterior.Z.shape[1]))
+    def mean_and_gradient(self, x: Vector) -> tuple[float, Vector]:
+        """Returns the posterior mean at x, shape (d,), and its gradient, shape (d,)."""
+        theta = self.hyperparameters.theta
+        difference = x - self.X
+        correlation = np.exp(-(np.abs(difference) @ theta))
+        slope = -theta * np.sign(difference) * correlation[:, None]
+        weight = self.hyperparameters.signal_variance * self.alpha
+        return float(self.prior_mean + weight @ correlation), weight @ slope
 
-    def value_and_gradient(self, z: ArrayLike) -> tuple[float, Vector]:
-        """Returns the posterior mean at z, shape (d,), and its gradient.
 
-        At a kink the gradient is the mean of both sides'.
-        """
-        posterior = self._fitted()
-        return posterior.mean_and_gradient(
-            checked_queries(np.atleast_2d(z), posterior.Z.shape[1])[0]
+def condition(rows: AveragedRows, hyperparameters: Hyperparameters) -> Posterior:
+    """Returns the process given rows of success rates."""
+    correlation = l1_correlation(rows.X, rows.X, hyperparameters.theta)
+    covariance = hyperparameters.signal_variance * correlation
+    covariance[np.diag_indices(len(rows.X))] += hyperparameters.noise(rows.count)
+    factor = cho_factor(covariance, lower=True, overwrite_a=True, check_finite=False)
+    targets = np.column_stack([rows.rate, np.ones(len(rows.rate))])
+    weights = cho_solve(factor, targets, check_finite=False)
+    prior_mean = float(weights[:, 0].sum() / weights[:, 1].sum())
+    return Posterior(
+        X=rows.X,
+        hyperparameters=hyperparameters,
+        prior_mean=prior_mean,
+        alpha=weights[:, 0] - prior_mean * weights[:, 1],
+    )
+
+
+def l1_correlation(A: Vector, B: Vector, theta: Vector) -> Vector:
+    """Returns the correlations of rows of A, shape (n, d), with rows of B, shape (m, d).
+
+    Args:
+        A: Feature vectors.
+        B: Feature vectors.
+        theta: Decay per unit of each feature, shape (d,), positive.
+
+    Returns:
+        Shape (n, m).
+    """
+    correlation: Vector = np.exp(-cdist(A * theta, B * theta, "cityblock"))
+    return correlation
+
+
+def coordinate_distances(X: Vector) -> Vector:
+    """Returns |x_i - x_j| of each feature, shape (d, n, n)."""
+    distances: Vector = np.abs(X.T[:, :, None] - X.T[:, None, :])
+    return distances
+
+
+def negative_log_likelihood(
+    log_parameters: Vector, distances: Vector, y: Vector, noise_variance: Vector
+) -> tuple[float, Vector]:
+    """Returns -log p(y) without its constant, and its gradient.
+
+    Args:
+        log_parameters: Logarithms of (theta, s, tau), shape (d + 2,).
+        distances: See `coordinate_distances`, shape (d, n, n).
+        y: Observed rates, shape (n,).
+        noise_variance: Known variance of each rate, shape (n,).
+    """
+    parameters = np.exp(log_parameters)
+    theta, signal, floor = parameters[:-2], parameters[-2], parameters[-1]
+    n = len(y)
+    signal_covariance = signal * np.exp(-np.tensordot(theta, distances, axes=1))
+    covariance = signal_covariance.copy()
+    covariance[np.diag_indices(n)] += noise_variance + floor
+    lower, _ = cho_factor(covariance, lower=True, overwrite_a=True, check_finite=False)
+    ones = np.ones(n)
+    weights = cho_solve((lower, True), np.column_stack([y, ones]), check_finite=False)
+    mu = (ones @ weights[:, 0]) / (ones @ weights[:, 1])
+    alpha = weights[:, 0] - mu * weights[:, 1]
+    value = 0.5 * (y - mu) @ alpha + np.sum(np.log(np.diagonal(lower)))
+
+    # d value = 1/2 tr((C^-1 - alpha alpha^T) dC); mu adds nothing, as it is at its optimum.
+    inverse, _ = dpotri(lower, lower=True)
+    sensitivity = inverse - np.outer(alpha, alpha)
+    diagonal = np.diagonal(sensitivity)
+    below = np.tril(sensitivity, -1) * signal_covariance
+    gradient = np.empty_like(parameters)
+    gradient[:-2] = -theta * [np.vdot(below, distance) for distance in distances]
+    gradient[-2] = below.sum() + 0.5 * signal * diagonal.sum()
+    gradient[-1] = 0.5 * floor * diagonal.sum()
+    return float(value), gradient
+
+
+def fit_hyperparameters(rows: AveragedRows, reach_variance: float) -> Hyperparameters:
+    """Maximises the marginal likelihood with L-BFGS-B from several starts, within bounds.
+
+    The starts run on at most 300 of the rows; the best result is improved on all of them.
+
+    Args:
+        rows: The rows.
+        reach_variance: Noise variance of a single reach.
+    """
+    scale = feature_scale(rows.X)
+    X, y, noise = rows.X / scale, rows.rate, reach_variance / rows.count
+    num_features = X.shape[1]
+    bounds = np.log([_BOUNDS["theta"]] * num_features + [_BOUNDS["signal"], _BOUNDS["floor"]])
+    variance = float(np.clip(np.var(y), *_BOUNDS["signal"]))
+    starts = [
+        np.log([theta] * num_features + [variance, 0.1 * variance]) for theta in _THETA_STARTS
+    ]
+    rng = make_generator("training", "rows for the search of hyper-parameters")
+    few = rng.permutation(len(X))[:_MAX_SEARCH_ROWS]
+
+    def improve(start: Vector, part: IntVector) -> tuple[float, Vector]:
+        result = minimize(
+            negative_log_likelihood,
+            np.clip(start, *bounds.T),
+            args=(coordinate_distances(X[part]), y[part], noise[part]),
+            jac=True,
+            method="L-BFGS-B",
+            bounds=bounds,
         )
+        return float(result.fun), np.asarray(result.x)
 
-    def _rows(self, Z: Vector, f: Vector, weight: Vector | None = None) -> AveragedRows:
-        if self.average:
-            return average_rows(Z, f, weight)
-        count = np.ones(len(f)) if weight is None else weight
-        return AveragedRows(Z=Z, rate=f, count=count, member=np.arange(len(f)))
-
-    def _choose_hyperparameters(
-        self, Z: Vector, f: Vector, fold: NDArray[np.intp]
-    ) -> Hyperparameters:
-        if len(self._rows(Z, f).Z) > _MAX_SETTINGS_ROWS:
-            order = make_generator("training", "rows for settings").permutation(len(f))
-            part = order[:_MAX_SETTINGS_ROWS]
-            Z, f, fold = Z[part], f[part], fold[part]
-        rows = self._rows(Z, f)
-        likeliest = fit_hyperparameters(
-            rows.Z, rows.rate, rows.count, reach_variance(average_rows(Z, f))
-        )
-        num_folds = int(fold.max()) + 1
-        if num_folds == 1:
-            return likeliest
-        candidates = [
-            replace(likeliest, reach_variance=effect * likeliest.reach_variance)
-            for effect in _DESIGN_EFFECTS
-        ]
-        error = np.zeros(len(candidates))
-        for held_out in range(num_folds):
-            out = fold == held_out
-            seen, unseen = self._rows(Z[~out], f[~out]), average_rows(Z[out], f[out])
-            for i, candidate in enumerate(candidates):
-                predicted = condition(seen, candidate).mean(unseen.Z)
-                error[i] += unseen.count @ (unseen.rate - predicted) ** 2
-        return candidates[int(np.argmin(error))]
-
-    def _fitted(self) -> Posterior:
-        if self._posterior is None:
-            raise EstimateError("the Gaussian process has no rows yet; call fit(Z, f) first")
-        return self._posterior
+    found = [improve(start, few) for start in starts]
+    _, best = min(found, key=lambda pair: pair[0])
+    if len(few) < len(X):
+        _, best = improve(best, np.arange(len(X)))
+    theta, signal, floor = np.exp(best[:-2]) / scale, np.exp(best[-2]), np.exp(best[-1])
+    return Hyperparameters(
+        theta=theta,
+        signal_variance=float(signal),
+        noise_floor=float(floor),
+        reach_variance=reach_variance,
+    )
 
 
-def _refuse_too_many(rows: int) -> None:
-    if rows > _MAX_ROWS:
-        raise EstimateError(
-            f"an exact Gaussian process takes at most {_MAX_ROWS} distinct rows, got {rows};"
-            " use the estimator 'gp-raw' or 'knn'"
-        )
+def _choose_hyperparameters(
+    X: Vector, y: Vector, weight: Vector, fold: IntVector
+) -> Hyperparameters:
+    """Returns the likeliest hyper-parameters with the best design effect, of 1,000 rows at most."""
+    rows = average_rows(X, y, weight)
+    if len(rows.X) > _MAX_SETTINGS_ROWS:
+        order = make_generator("training", "rows for settings").permutation(len(y))
+        part = order[:_MAX_SETTINGS_ROWS]
+        X, y, weight, fold = X[part], y[part], weight[part], fold[part]
+        rows = average_rows(X, y, weight)
+    likeliest = fit_hyperparameters(rows, reach_variance(rows))
+    num_folds = int(fold.max()) + 1
+    if num_folds == 1:
+        return likeliest
+    candidates = [
+        replace(likeliest, reach_variance=effect * likeliest.reach_variance)
+        for effect in _DESIGN_EFFECTS
+    ]
+    error = np.zeros(len(candidates))
+    for held_out in range(num_folds):
+        out = fold == held_out
+        seen = average_rows(X[~out], y[~out], weight[~out])
+        unseen = average_rows(X[out], y[out], weight[out])
+        for i, candidate in enumerate(candidates):
+            predicted = condition(seen, candidate).mean(unseen.X)
+            error[i] += unseen.count @ (unseen.rate - predicted) ** 2
+    return candidates[int(np.argmin(error))]

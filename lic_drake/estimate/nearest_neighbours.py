@@ -1,158 +1,209 @@
 """K nearest neighbours with Gaussian weights (paper III-D)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
+from sklearn.base import clone
 
-from lic_drake.estimate.averaging import AveragedRows, average_rows
-from lic_drake.estimate.bandwidth import gaussian_weights, query_neighbours, select_bandwidths
-from lic_drake.estimate.checks import EstimateError, checked_queries, checked_rows, checked_weights
-from lic_drake.estimate.estimator import Prediction
-from lic_drake.estimate.folds import selection_folds
-from lic_drake.types import Vector
+from lic_drake.errors import EstimateError
+from lic_drake.estimate.estimator import SuccessEstimator
+from lic_drake.estimate.rows import AveragedRows, average_rows, feature_scale, selection_folds
+from lic_drake.seeds import make_generator
+from lic_drake.types import BoolVector, IntVector, Vector
+
+_MAX_POINTS = 500
+_SEARCH_NEIGHBOURS = 100
+# Bandwidths in standard deviations of their feature: from nearest neighbours only to a feature
+# that tells nothing.
+_SMALLEST, _LARGEST = 0.02, 8.0
+_COMMON = np.geomspace(0.1, 1.6, 9)
+_STEPS = (2.0, 2.0, np.sqrt(2.0))
+_DECIMALS = 9
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Points:
-    """Distinct feature vectors, also divided by the bandwidths, with success rates and counts."""
+    """Distinct feature vectors in bandwidths, shape (m, d), with success rates and counts."""
 
     tree: cKDTree
-    Z: Vector
     points: Vector
     rate: Vector
     count: Vector
 
 
-class NearestNeighbours:
-    """A Gaussian-weighted average over neighbours; satisfies `SuccessEstimator`.
+class NearestNeighbours(SuccessEstimator):
+    """A Gaussian-weighted average over neighbours.
 
     Neighbours are distinct feature vectors, each with the mean and the number of its reaches:
     among raw rows a tie at the K-th place would let the order of rows choose environments.
     Distances d are Euclidean in features divided by their bandwidths, weights exp(-d^2 / 2).
-
-    The spread is the standard deviation of the weighted average if each reach is an independent
-    draw (Kish's effective sample size, Jeffreys' prior). It knows nothing of the luck that
-    reaches in one environment share, nor of the bias that averaging over neighbours brings. Where
-    neighbours are sparse the estimate is too sure of itself: among the PR2's starts that it gave
-    0.8 to 1 (mean 0.87) 0.62 succeeded.
+    Where neighbours are sparse the estimate is overconfident: of the PR2's starts with estimates
+    from 0.8 to 1 (mean 0.87) 0.62 succeeded.
 
     Attributes:
         neighbours: K, the number of distinct feature vectors averaged.
+        bandwidth: Standard deviation of the weights along each feature, shape (d,), in its unit.
+            None: `fit` takes the bandwidths that best predict held-out environments.
+        held_out: Matrix A, shape (k, d). If given, rows with equal A x are held out together
+            instead of environments, for a library that tries each pair of goal and start in
+            several environments: without one of them the pair is still there, and bandwidths that
+            see nothing but the pair itself win.
+        bandwidth_: The bandwidths in use.
     """
 
-    def __init__(self, *, neighbours: int = 100, bandwidth: ArrayLike | None = None) -> None:
-        """Sets up an estimator.
+    def __init__(
+        self,
+        neighbours: int = 100,
+        bandwidth: ArrayLike | None = None,
+        held_out: ArrayLike | None = None,
+    ) -> None:
+        self.neighbours = neighbours
+        self.bandwidth = bandwidth
+        self.held_out = held_out
 
-        Args:
-            neighbours: See the class.
-            bandwidth: Standard deviation of the weights along each feature, shape (d,), in its
-                unit. By default `fit` takes those that best predict environments that were held
-                out.
-
-        Raises:
-            EstimateError: K below 1, or a bandwidth that is not positive.
-        """
-        given = None if bandwidth is None else np.asarray(bandwidth, dtype=float)
-        if neighbours < 1 or (given is not None and not np.all(given > 0.0)):
+    def _fit(self, X: Vector, y: Vector, groups: Any, weight: Vector) -> None:
+        given = None if self.bandwidth is None else np.asarray(self.bandwidth, dtype=np.float64)
+        if self.neighbours < 1 or (given is not None and not np.all(given > 0.0)):
             raise EstimateError(
                 "nearest neighbours need 1 or more neighbours and positive bandwidths,"
-                f" got {neighbours} and {given}"
+                f" got {self.neighbours} and {given}"
             )
-        self.neighbours = neighbours
-        self._given = given
-        self._chosen = given
-        self._points: _Points | None = None
-
-    @property
-    def bandwidth(self) -> Vector:
-        """The bandwidths in use, shape (d,), in the units of the features.
-
-        Raises:
-            EstimateError: Neither given nor fitted yet.
-        """
-        if self._chosen is None:
-            raise EstimateError("the bandwidth is not chosen yet; call fit(Z, f) first")
-        return self._chosen
-
-    def fit(self, Z: ArrayLike, f: ArrayLike, environment: ArrayLike | None = None) -> Self:
-        """Learns from features Z, shape (n, d), and successes f, shape (n,); see `Predictor`."""
-        Z, f = checked_rows(Z, f)
-        rows = average_rows(Z, f)
-        if self._given is None:
-            fold = selection_folds(environment, len(f))
-            self._chosen = select_bandwidths(rows, f, fold)
-        self._points = _index(rows, self.bandwidth)
-        return self
-
-    def update(self, Z: ArrayLike, f: ArrayLike, weight: ArrayLike = 1.0) -> Self:
-        """Takes further rows in; see `UpdatableEstimator`.
-
-        A row of weight w counts as w reaches: its kernel weight is multiplied by w. Bandwidths
-        stay.
-        """
-        at = self._fitted()
-        Z, f = checked_rows(Z, f)
-        checked_queries(Z, at.points.shape[1])
-        counts = np.concatenate([at.count, checked_weights(weight, len(f))])
-        rates = np.concatenate([at.rate, f])
-        self._points = _index(average_rows(np.vstack([at.Z, Z]), rates, counts), self.bandwidth)
-        return self
-
-    def conditioned_on(
-        self, Z: ArrayLike, f: ArrayLike, weight: ArrayLike = 1.0
-    ) -> "NearestNeighbours":
-        """Returns neighbours with these bandwidths among other rows only."""
-        other = NearestNeighbours(neighbours=self.neighbours, bandwidth=self.bandwidth)
-        Z, f = checked_rows(Z, f)
-        rows = average_rows(Z, f, checked_weights(weight, len(f)))
-        other._points = _index(rows, self.bandwidth)
-        return other
-
-    def predict(self, Z: ArrayLike) -> Prediction:
-        """Estimates P(success) for queries Z, shape (n, d); see `Predictor`."""
-        at = self._fitted()
-        queries = checked_queries(Z, at.points.shape[1]) / self.bandwidth
-        distance, index = query_neighbours(at.tree, queries, self.neighbours)
-        weight = gaussian_weights(distance)
-        weighted_count = weight * at.count[index]
-        total = weighted_count.sum(axis=1)
-        probability = np.sum(weighted_count * at.rate[index], axis=1) / total
-        sample_size = total**2 / np.sum(weight * weighted_count, axis=1)
-        p = (sample_size * probability + 0.5) / (sample_size + 1.0)
-        return Prediction(
-            probability=np.clip(probability, 0.0, 1.0),
-            spread=np.sqrt(p * (1.0 - p) / sample_size),
+        rows = average_rows(X, y, weight)
+        if given is None:
+            if self.held_out is not None:
+                common = np.round(X @ np.asarray(self.held_out).T, _DECIMALS) + 0.0
+                groups = np.unique(common, axis=0, return_inverse=True)[1].ravel()
+            given = select_bandwidths(rows, y, weight, selection_folds(groups, len(y)))
+        self.bandwidth_ = given
+        points = rows.X / given
+        self._points = _Points(
+            tree=cKDTree(points), points=points, rate=rows.rate, count=rows.count
         )
 
-    def values(self, Z: ArrayLike) -> Vector:
-        """Returns the weighted averages at queries Z, shape (n, d): shape (n,)."""
-        return self.predict(Z).probability
+    def _settled(self) -> Self:
+        return cast(Self, clone(self).set_params(bandwidth=self.bandwidth_))
 
-    def value_and_gradient(self, z: ArrayLike) -> tuple[float, Vector]:
-        """Returns the weighted average at z, shape (d,), and its gradient.
+    def _values(self, X: Vector) -> Vector:
+        at = self._points
+        distance, index = query_neighbours(at.tree, X / self.bandwidth_, self.neighbours)
+        weight = gaussian_weights(distance) * at.count[index]
+        values = np.sum(weight * at.rate[index], axis=1) / weight.sum(axis=1)
+        return np.clip(values, 0.0, 1.0)  # It leaves [0, 1] by rounding only.
 
-        Both belong to the neighbours at hand: the estimate is smooth while these stay the same
-        and has a small jump where they change.
-        """
-        at = self._fitted()
-        query = checked_queries(np.atleast_2d(z), at.points.shape[1])[0] / self.bandwidth
+    def _value_and_gradient(self, x: Vector) -> tuple[float, Vector]:
+        """Both belong to the neighbours at hand: the estimate jumps a little where these change."""
+        at = self._points
+        query = x / self.bandwidth_
         distance, index = query_neighbours(at.tree, query, self.neighbours)
         weight = gaussian_weights(distance) * at.count[index]
         weight /= weight.sum()
         rate = at.rate[index]
         value = weight @ rate
         pull = (weight * (rate - value)) @ (at.points[index] - query)
-        return float(value), pull / self.bandwidth
-
-    def _fitted(self) -> _Points:
-        if self._points is None:
-            raise EstimateError("the nearest neighbours have no rows yet; call fit(Z, f) first")
-        return self._points
+        return float(value), pull / self.bandwidth_
 
 
-def _index(rows: AveragedRows, bandwidth: Vector) -> _Points:
-    points = rows.Z / bandwidth
-    return _Points(tree=cKDTree(points), Z=rows.Z, points=points, rate=rows.rate, count=rows.count)
+def query_neighbours(tree: cKDTree, queries: Vector, neighbours: int) -> tuple[Vector, IntVector]:
+    """Returns distances and indices of the nearest points, shape (..., k), nearest first.
+
+    k is `neighbours`, or the number of points if there are fewer.
+    """
+    k = min(neighbours, tree.n)
+    distance, index = tree.query(queries, k=k)
+    if k == 1:  # The tree then leaves out the axis of neighbours.
+        return np.expand_dims(distance, -1), np.expand_dims(index, -1)
+    return distance, index
+
+
+def gaussian_weights(distance: Vector) -> Vector:
+    """Returns exp(-d^2 / 2) relative to the nearest, so that not all of them underflow.
+
+    Args:
+        distance: Distances d in bandwidths, shape (..., k), the nearest first.
+    """
+    nearest = distance[..., :1]
+    weights: Vector = np.exp(-0.5 * (distance**2 - nearest**2))
+    return weights
+
+
+def select_bandwidths(rows: AveragedRows, y: Vector, weight: Vector, fold: IntVector) -> Vector:
+    """Returns the bandwidth of each feature, shape (d,), by search along one after the other.
+
+    It minimises the squared error in held-out folds, at 500 points at most and with 100
+    neighbours. Where features matter differently, as a start's orientation and a goal's distance
+    do, a common bandwidth in standard deviations averages too much along one and too little along
+    the other.
+
+    Args:
+        rows: The distinct points.
+        y: Success of each reach, shape (n,).
+        weight: How many reaches each counts as, shape (n,).
+        fold: Fold of each reach, shape (n,).
+    """
+    scale = feature_scale(rows.X)
+    if len(rows.X) == 1 or fold.max() == 0:
+        return scale  # Nothing can be held out.
+    error = _held_out_error(rows, y, weight, fold)
+    common = float(min(_COMMON, key=lambda factor: error(factor * scale)))
+    return _improve(error, common * scale, scale, np.ptp(rows.X, axis=0) > 0.0)
+
+
+def _improve(
+    error: Callable[[Vector], float], bandwidth: Vector, scale: Vector, varies: BoolVector
+) -> Vector:
+    """Returns bandwidths after a search along each varying feature, with shrinking steps."""
+    least = error(bandwidth)
+    for step in _STEPS:
+        for feature in np.flatnonzero(varies):
+            for factor in (step, 1.0 / step):
+                while True:
+                    other = bandwidth.copy()
+                    other[feature] *= factor
+                    inside = _SMALLEST < other[feature] / scale[feature] < _LARGEST
+                    if not inside or (found := error(other)) >= least:
+                        break
+                    bandwidth, least = other, found
+    return bandwidth
+
+
+def _held_out_error(
+    rows: AveragedRows, y: Vector, weight: Vector, fold: IntVector
+) -> Callable[[Vector], float]:
+    """Returns the squared error as a function of the bandwidths."""
+    # Numbers of reaches and of successes, each of shape (points, folds).
+    shape = (len(rows.X), int(fold.max()) + 1)
+    cell = np.ravel_multi_index((rows.member, fold), shape)
+    size = shape[0] * shape[1]
+    tries = np.bincount(cell, weights=weight, minlength=size).reshape(shape)
+    successes = np.bincount(cell, weights=weight * y, minlength=size).reshape(shape)
+    # What each fold is predicted from: everything but itself.
+    seen_tries = tries.sum(axis=1, keepdims=True) - tries
+    seen_successes = successes.sum(axis=1, keepdims=True) - successes
+    rate = seen_successes.sum() / seen_tries.sum()
+    rng = make_generator("training", "points for the choice of a bandwidth")
+    tried = rng.permutation(len(rows.X))[:_MAX_POINTS]
+    misses, hits = tries[tried] - successes[tried], successes[tried]
+
+    def error(bandwidth: Vector) -> float:
+        points = rows.X / bandwidth
+        distance, index = query_neighbours(cKDTree(points), points[tried], _SEARCH_NEIGHBOURS)
+        kernel = csr_array(
+            (
+                gaussian_weights(distance).ravel(),
+                index.ravel(),
+                np.arange(0, index.size + 1, index.shape[1]),
+            ),
+            shape=(len(tried), len(points)),
+        )
+        total = kernel @ seen_tries
+        # Where a fold holds all neighbours, the rate of the other folds is all there is.
+        known = total > 0.0
+        predicted = np.where(known, kernel @ seen_successes / np.where(known, total, 1.0), rate)
+        return float(np.sum(hits * (1.0 - predicted) ** 2 + misses * predicted**2))
+
+    return error

@@ -1,42 +1,29 @@
-"""The known success estimators. A new one is a file of your own with `register_estimator`."""
+"""The success estimators by name. A new one is a file of your own with `register_estimator`."""
 
 from collections.abc import Callable
-from dataclasses import replace
-from functools import partial
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from lic_drake.estimate.checks import EstimateError
-from lic_drake.estimate.estimator import SuccessEstimator, UpdatableEstimator
+from lic_drake.errors import EstimateError
 from lic_drake.estimate.features import PLANAR_LIC1, FeatureMap
-from lic_drake.estimate.gaussian_process import GaussianProcess
-from lic_drake.estimate.linear_map import (
-    MappedEstimator,
-    can_be_relative,
-    features_apart,
-    relative_features,
-)
-from lic_drake.estimate.local import LocalEstimator
-from lic_drake.estimate.local_process import choose_process
-from lic_drake.estimate.nearest_neighbours import NearestNeighbours
-from lic_drake.estimate.stacked import StackedEstimator
 from lic_drake.registry import Registry
 
-EstimatorFactory = Callable[[FeatureMap], SuccessEstimator]
-"""Returns a new, unfitted estimator for what its features mean."""
+if TYPE_CHECKING:  # Names must be quick to list; scikit-learn takes most of a second to import.
+    from lic_drake.estimate.estimator import SuccessEstimator
+
+EstimatorFactory = Callable[[FeatureMap], "SuccessEstimator"]
+"""Returns a new, unfitted estimator for features of this meaning."""
 
 _ESTIMATORS: Registry[EstimatorFactory] = Registry("estimator", EstimateError)
 
-_RESERVED = ("rnd", "cost")
-"""Methods of selection without an estimator."""
+_RESERVED = ("rnd", "cost")  # Methods of selection without an estimator.
 
 
 def register_estimator(name: str, factory: EstimatorFactory) -> None:
-    """Makes an estimator known under a name, which is then a method of selection, too.
+    """Registers an estimator under a name, which is then a method of selection, too.
 
     Args:
         name: What the command line calls it.
-        factory: Returns a new, unfitted one for a feature map; it satisfies `SuccessEstimator`.
+        factory: Returns a new, unfitted `SuccessEstimator` for a feature map.
 
     Raises:
         EstimateError: The name is taken or means another method, or `factory` cannot be called.
@@ -55,12 +42,12 @@ def register_estimator(name: str, factory: EstimatorFactory) -> None:
     _ESTIMATORS.register(name, factory)
 
 
-def make_estimator(name: str, features: FeatureMap = PLANAR_LIC1) -> SuccessEstimator:
+def make_estimator(name: str, features: FeatureMap = PLANAR_LIC1) -> "SuccessEstimator":
     """Returns a new, unfitted estimator.
 
     Args:
         name: One of `estimator_names`.
-        features: What z means.
+        features: What x means.
 
     Raises:
         EstimateError: The estimator is unknown.
@@ -73,53 +60,27 @@ def estimator_names() -> tuple[str, ...]:
     return _ESTIMATORS.names()
 
 
-def _process(features: FeatureMap) -> SuccessEstimator:
+def _process(features: FeatureMap) -> "SuccessEstimator":
     """All rows of LIC-1; of LIC-2's many rows the nearest."""
-    if can_be_relative(features):
-        return _in_space(features, GaussianProcess, None)
-    if not features.observed:
-        return GaussianProcess()
-    return LocalEstimator(choose_process, features.situation, size=800)
+    if features.observed:
+        from lic_drake.estimate.local import LocalEstimator, choose_process
+
+        return LocalEstimator(choose_process, features.situation, size=800)
+    from lic_drake.estimate.gaussian_process import GaussianProcess
+
+    return GaussianProcess()
 
 
-def _neighbours(features: FeatureMap) -> SuccessEstimator:
-    if can_be_relative(features):
-        return _in_space(features, NearestNeighbours, features.situation)
-    if not features.observed:
-        return NearestNeighbours()
-    return LocalEstimator(
-        lambda near: NearestNeighbours(neighbours=400, bandwidth=near.length_scale),
-        features.situation,
-        size=2000,
-    )
+def _neighbours(features: FeatureMap) -> "SuccessEstimator":
+    """All rows of LIC-1; of LIC-2's many rows the nearest."""
+    if features.observed:
+        from lic_drake.estimate.local import LocalEstimator, choose_neighbours
 
+        return LocalEstimator(choose_neighbours, features.situation, size=2000)
+    from lic_drake.estimate.nearest_neighbours import NearestNeighbours
 
-def _in_space(
-    features: FeatureMap, make: Callable[[], UpdatableEstimator], held_out: slice | None
-) -> UpdatableEstimator:
-    """Returns an estimator that looks at where the goal is from the start.
-
-    Args:
-        features: What z means.
-        make: Returns the estimator that is told, for each stage.
-        held_out: See `MappedEstimator`.
-    """
-    if not features.observed:
-        return MappedEstimator(make(), relative_features(features), held_out)
-    alone = replace(features, observed=())
-    return StackedEstimator(
-        make_first=lambda: _in_space(alone, make, alone.situation if held_out else None),
-        make_second=make,
-        alone=np.array([features.names.index(name) for name in alone.names]),
-        matrix=features_apart(features, "start", "first_start"),
-    )
+    return NearestNeighbours(held_out=features.goal_matrix if features.relative else None)
 
 
 register_estimator("gp", _process)
 register_estimator("knn", _neighbours)
-register_estimator(
-    "gp-raw",
-    lambda features: LocalEstimator(
-        partial(choose_process, average=False), features.situation, size=800
-    ),
-)

@@ -6,8 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from lic_drake.errors import RequestError
-from lic_drake.estimate.checks import EstimateError
+from lic_drake.errors import EstimateError, RequestError
 from lic_drake.reach.start import Starts
 from lic_drake.select.baselines import make_selection
 from lic_drake.select.objective import Objective, SuccessModel, SuccessObjective

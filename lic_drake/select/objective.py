@@ -1,22 +1,24 @@
 """F(T_b0(s), x0) of paper Eq. (3) as a function of the initial condition, for one situation."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from lic_drake.estimate.estimator import SuccessEstimator
 from lic_drake.estimate.features import FeatureMap
 from lic_drake.reach.start import Starts
 from lic_drake.select.situation import FailedReach
 from lic_drake.types import Vector
+
+if TYPE_CHECKING:
+    from lic_drake.estimate.estimator import SuccessEstimator
 
 
 @dataclass(frozen=True, kw_only=True)
 class SuccessModel:
     """An estimator with the meaning of its features."""
 
-    estimator: SuccessEstimator
+    estimator: "SuccessEstimator"
     features: FeatureMap
 
 

@@ -8,10 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lic_drake.errors import RequestError
-from lic_drake.estimate.categories import features_of
-from lic_drake.estimate.checks import EstimateError
-from lic_drake.estimate.estimator import UpdatableEstimator
-from lic_drake.estimate.features import FeatureMap
+from lic_drake.estimate.features import FeatureMap, features_of
 from lic_drake.estimate.registry import estimator_names, make_estimator
 from lic_drake.experience.second_reach import pair_reaches
 from lic_drake.robots.arm import Arm
@@ -54,7 +51,8 @@ def method_names() -> tuple[str, ...]:
     """Returns the names of all simple strategies.
 
     They are the baselines and, for each estimator, LIC (LIC-1, then LIC-2) under its name and
-    LIC-1 for all attempts under its name with a 1. FIRST>LATER is a strategy, too.
+    LIC-1 for all attempts under its name with a 1: the same where a category has no LIC-2.
+    FIRST>LATER is a strategy, too.
     """
     return ("rnd", "cost", *estimator_names(), *(f"{name}1" for name in estimator_names()))
 
@@ -80,7 +78,7 @@ def check_method(method: str) -> None:
 
 
 def needs_library(method: str) -> bool:
-    """Tells whether a strategy learns from an experience library.
+    """Returns whether a strategy learns from an experience library.
 
     Raises:
         RequestError: The strategy is unknown.
@@ -132,7 +130,7 @@ def make_selector(
     features, only_first = features_of(category), method not in estimator_names()
     estimator = method[:-1] if only_first else method
     second = None
-    if not only_first:
+    if features.second is not None and not only_first:
         pairs = pair_reaches(columns) if pairs is None else pairs
         added_pairs = None if added is None else pair_reaches(added)
         second = fit_model(estimator, features.second, pairs, added_pairs)
@@ -150,25 +148,25 @@ def fit_model(
     columns: Mapping[str, NDArray[Any]],
     added: Mapping[str, NDArray[Any]] | None = None,
 ) -> SuccessModel:
-    """Returns an estimator fitted to the columns of a library, then updated with added ones.
+    """Returns an estimator fitted to the columns of a library.
+
+    Its settings come from the simulated rows; experience from elsewhere changes the estimate, by
+    its weight, but no setting.
 
     Args:
         estimator: Its name, see `estimator_names`.
-        features: What z is made of.
+        features: What x is made of.
         columns: Of a library D1, or the pairs D2 where the features observe a first reach.
-        added: The same of experience from elsewhere, with weights; it changes no setting.
-
-    Raises:
-        EstimateError: The estimator has no `update` and there is something to add.
+        added: The same of experience from elsewhere, with weights.
     """
     rows = features.rows(columns)
-    fitted = make_estimator(estimator, features).fit(rows.Z, rows.f, rows.environment)
     if added is not None and len(added["success"]):
-        if not isinstance(fitted, UpdatableEstimator):
-            raise EstimateError(
-                f"the estimator {estimator!r} has no method `update` and cannot learn from the"
-                " records that were added to the library; give it one, or use another estimator"
-            )
-        more = features.rows(added)
-        fitted.update(more.Z, more.f, more.weight)
+        rows = rows.join(features.rows({**added, "source": np.full(len(added["success"]), "")}))
+    # A library without any simulated row chooses its settings from all.
+    known = rows.simulated if rows.simulated.any() else np.ones_like(rows.simulated)
+    fitted = make_estimator(estimator, features).fit(
+        rows.X[known], rows.y[known], rows.groups[known], rows.weight[known]
+    )
+    if not known.all():
+        fitted = fitted.conditioned_on(rows.X, rows.y, rows.weight)
     return SuccessModel(estimator=fitted, features=features)

@@ -8,7 +8,7 @@ from lic_drake.clutter.instance import ClutterInstance, join, make_objects
 from lic_drake.clutter.placement import place_discs
 from lic_drake.clutter.registry import register_category
 from lic_drake.config import check_numbers
-from lic_drake.estimate.categories import register_features
+from lic_drake.estimate.features import register_features
 
 
 @dataclass(kw_only=True)

@@ -15,21 +15,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lic_drake.errors import LicError
-from lic_drake.estimate.categories import features_of
-from lic_drake.estimate.checks import feature_scale
-from lic_drake.estimate.cross_validation import log_loss
 from lic_drake.estimate.estimator import SuccessEstimator
-from lic_drake.estimate.features import ExperienceRows, FeatureMap
-from lic_drake.estimate.folds import environment_folds
+from lic_drake.estimate.features import ExperienceRows, FeatureMap, features_of
 from lic_drake.estimate.local import LocalEstimator
 from lic_drake.estimate.nearest_neighbours import NearestNeighbours
 from lic_drake.estimate.registry import make_estimator
+from lic_drake.estimate.rows import feature_scale, group_folds
 from lic_drake.experience.second_reach import pair_reaches
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.robots.registry import get_robot
 from lic_drake.select.baselines import corridor_cost
 from lic_drake.types import Vector
 from scripts.common import RESULTS, make_parser, run_script
+from scripts.cross_validation.scores import log_loss
 
 Columns = dict[str, NDArray[Any]]
 
@@ -59,10 +57,9 @@ class FixedBandwidth(NearestNeighbours):
         super().__init__()
         self.share = share
 
-    def fit(self, Z: Any, f: Any, environment: Any = None) -> Any:
-        """Learns from rows; see `NearestNeighbours`."""
-        self._given = self._chosen = self.share * feature_scale(Z)
-        return super().fit(Z, f, environment)
+    def _fit(self, X: Vector, y: Vector, groups: Any, weight: Vector) -> None:
+        self.bandwidth = self.share * feature_scale(X)
+        super()._fit(X, y, groups, weight)
 
 
 def small_local_neighbours(features: FeatureMap) -> SuccessEstimator:
@@ -101,12 +98,12 @@ def held_out_values(
     asked: NDArray[np.bool_] | None = None,
 ) -> Vector:
     """Returns unclipped estimates from fits without a row's fold; NaN where not asked."""
-    values = np.full(len(rows.f), np.nan)
+    values = np.full(len(rows.y), np.nan)
     for k in range(int(fold.max()) + 1):
         seen, out = fold != k, (fold == k) & (True if asked is None else asked)
         if np.any(out):
-            estimator = make().fit(rows.Z[seen], rows.f[seen], rows.environment[seen])
-            values[out] = estimator.values(rows.Z[out])
+            estimator = make().fit(rows.X[seen], rows.y[seen], rows.groups[seen])
+            values[out] = estimator.values(rows.X[out])
     return values
 
 
@@ -154,37 +151,37 @@ def first_reaches(path: Path, columns: Columns, folds: int) -> list[dict[str, An
     """Compares variants of LIC-1; adds its held-out estimates, costs and folds to the columns."""
     features = features_of(columns["category"][0]).first
     rows = features.rows(columns)
-    fold = environment_folds(rows.environment, folds)
+    fold = group_folds(rows.groups, folds)
     x0 = np.column_stack([columns[f"start_{name}"] for name in ("x", "y", "phi")])
-    others = other_features(rows.Z, x0)
+    others = other_features(rows.X, x0)
     variants: dict[str, tuple[Callable[[], SuccessEstimator], Vector]] = {
-        name: (partial(make_estimator, name), rows.Z) for name in ("gp", "knn")
+        name: (partial(make_estimator, name), rows.X) for name in ("gp", "knn")
     }
     for share in (0.01, 0.2, 0.3):
         name = f"knn, bandwidths of {share} standard deviations"
-        variants[name] = (partial(FixedBandwidth, share), rows.Z)
+        variants[name] = (partial(FixedBandwidth, share), rows.X)
     for name, Z in others.items():
         for kind in ("gp", "knn"):
             variants[f"{kind}, {name}"] = (partial(make_estimator, kind), Z)
     values = {
-        name: held_out_values(make, replace(rows, Z=Z), fold)
+        name: held_out_values(make, replace(rows, X=Z), fold)
         for name, (make, Z) in variants.items()
     }
     values["COST"] = -others["corridor cost besides"][:, -1]
-    values["RND"] = np.zeros(len(rows.f))
+    values["RND"] = np.zeros(len(rows.y))
     columns |= {"_lic1": values["gp"], "_cost": -values["COST"], "_fold": fold}
 
     order, size = _blocks(columns, ("stream", "environment", "goal_x", "goal_y"))
     choices = Choices(
-        rows.f[order].reshape(-1, size),
+        rows.y[order].reshape(-1, size),
         np.ones(len(order) // size),
-        rows.environment[order].reshape(-1, size)[:, 0],
+        rows.groups[order].reshape(-1, size)[:, 0],
     )
     success = {name: choices.share(v[order].reshape(-1, size)) for name, v in values.items()}
     oracle = choices.success.max(axis=1)
     table = [table_row(path.name, "first", "oracle", np.nan, [choices.mean(oracle)])]
     for name in ("RND", "COST", *variants):
-        loss = log_loss(values[name], rows.f) if name in variants else np.nan
+        loss = log_loss(values[name], rows.y) if name in variants else np.nan
         results = [choices.mean(success[name]), choices.mean(success[name] - success["gp"])]
         table.append(table_row(path.name, "first", name, loss, results))
     return table
@@ -205,8 +202,8 @@ def second_reaches(path: Path, columns: Columns) -> list[dict[str, Any]]:
     likely[likely < SMALLEST_WEIGHT] = 0.0
     chosen = np.sum(estimate * own, axis=1) == estimate.max(axis=1)
     rows = category.first.rows(pairs)
-    environment = rows.environment.reshape(-1, size)[:, 0]
-    success = rows.f.reshape(-1, size)
+    environment = rows.groups.reshape(-1, size)[:, 0]
+    success = rows.y.reshape(-1, size)
     both = [Choices(success, w, environment) for w in (chosen.astype(float), likely)]
 
     scores = {
@@ -229,7 +226,7 @@ def second_reaches(path: Path, columns: Columns) -> list[dict[str, Any]]:
         found = held_out_values(
             partial(make, features), features.rows(pairs), pairs["_fold"], asked
         )
-        losses[name] = log_loss(found[asked], rows.f[asked])
+        losses[name] = log_loss(found[asked], rows.y[asked])
         scores[name] = np.where(asked, found, 0.0).reshape(-1, size)
         scores[f"{name}, away from the first"] = np.where(near_start, -np.inf, scores[name])
         losses[f"{name}, away from the first"] = np.nan

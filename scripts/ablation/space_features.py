@@ -5,8 +5,7 @@
 One goal of the library after the other is held out, in all environments.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from lic_drake.estimate.categories import CategoryFeatures, features_of
-from lic_drake.estimate.cross_validation import brier_score, calibration_curve, log_loss
 from lic_drake.estimate.estimator import SuccessEstimator
-from lic_drake.estimate.features import FeatureMap
-from lic_drake.estimate.gaussian_process import GaussianProcess
-from lic_drake.estimate.linear_map import MappedEstimator
-from lic_drake.estimate.local import LocalEstimator
-from lic_drake.estimate.local_process import choose_process
+from lic_drake.estimate.features import SPACE_LIC1
 from lic_drake.estimate.nearest_neighbours import NearestNeighbours
 from lic_drake.estimate.registry import make_estimator
 from lic_drake.evaluate.statistics import count, mcnemar
@@ -31,6 +24,7 @@ from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 from lic_drake.types import Vector
 from scripts.common import make_parser, run_script, write_report
+from scripts.cross_validation.scores import brier_score, calibration_curve, log_loss
 
 Columns = dict[str, NDArray[Any]]
 
@@ -45,27 +39,11 @@ SPARSE_BANDWIDTHS = 1.0
 """Queries further than this from all rows count as sparse, bandwidths of the nearest neighbours."""
 
 
-def plain_first(name: str, features: FeatureMap) -> SuccessEstimator:
-    """Returns LIC-1's estimator on the features as they are, equal ones made equal to the bit."""
-    inner = GaussianProcess() if name == "gp" else NearestNeighbours()
-    return MappedEstimator(inner, np.eye(len(features.names)))
-
-
-def local_second(name: str, features: FeatureMap) -> SuccessEstimator:
-    """Returns LIC-2's estimator as it is for planar arms: local rows of D2."""
-    if name == "gp":
-        return LocalEstimator(choose_process, features.situation, size=800)
-    return LocalEstimator(
-        lambda near: NearestNeighbours(neighbours=400, bandwidth=near.length_scale),
-        features.situation,
-        size=2000,
-    )
-
-
-FIRSTS: dict[str, Callable[[str, FeatureMap], SuccessEstimator]] = {
-    PLAIN: plain_first,
-    RELATIVE: make_estimator,
+FIRSTS = {
+    PLAIN: replace(SPACE_LIC1, relative=False, start=(*SPACE_LIC1.start, "start_qx")),
+    RELATIVE: SPACE_LIC1,
 }
+SECOND = replace(FIRSTS[PLAIN], observed=("first_start_y", "first_start_z"))
 
 
 @dataclass
@@ -98,36 +76,32 @@ def goal_of_each(columns: Columns) -> NDArray[np.intp]:
     return goal
 
 
-def hold_out_goals(name: str, features: CategoryFeatures, columns: Columns) -> HeldOut:
+def hold_out_goals(name: str, columns: Columns) -> HeldOut:
     """Predicts first and second reaches to each goal from the reaches to the others."""
-    rows, goal = features.first.rows(columns), goal_of_each(columns)
+    goal, groups = goal_of_each(columns), SPACE_LIC1.rows(columns).groups
     n = len(goal)
     found = HeldOut(
         {key: np.empty(n) for key in FIRSTS}, {key: np.full(n, np.nan) for key in FIRSTS}
     )
     for k in range(int(goal.max()) + 1):
         out = goal == k
-        for key, make_first in FIRSTS.items():
-            first = make_first(name, features.first)
-            first.fit(rows.Z[~out], rows.f[~out], rows.environment[~out])
-            found.probability[key][out] = first.values(rows.Z[out])
-            found.gap[key][out] = _gap(first, rows.Z[~out], rows.Z[out])
-        pairs = features.second.rows(pair_reaches({key: v[~out] for key, v in columns.items()}))
-        second = local_second(name, features.second)
-        second.fit(pairs.Z, pairs.f, pairs.environment)
-        for environment in np.unique(rows.environment[out]):
-            here = np.flatnonzero(out & (rows.environment == environment))
-            _choose(found, columns, here, features, second)
+        for key, features in FIRSTS.items():
+            rows = features.rows(columns)
+            X = np.round(rows.X, 9)  # Sums of the same numbers in another order are equal.
+            first = make_estimator(name, features).fit(X[~out], rows.y[~out], groups[~out])
+            found.probability[key][out] = first.values(X[out])
+            found.gap[key][out] = _gap(first, X[~out], X[out])
+        pairs = SECOND.rows(pair_reaches({key: v[~out] for key, v in columns.items()}))
+        second = make_estimator(name, SECOND).fit(pairs.X, pairs.y, pairs.groups)
+        for environment in np.unique(groups[out]):
+            here = np.flatnonzero(out & (groups == environment))
+            _choose(found, columns, here, second)
         print(f"{name}: {k + 1} of {goal.max() + 1} goals", flush=True)
     return found
 
 
 def _choose(
-    found: HeldOut,
-    columns: Columns,
-    here: NDArray[np.intp],
-    features: CategoryFeatures,
-    second: SuccessEstimator,
+    found: HeldOut, columns: Columns, here: NDArray[np.intp], second: SuccessEstimator
 ) -> None:
     """Adds the first and second choices among the reaches of one environment and goal."""
     won = columns["success"][here].astype(bool)
@@ -143,19 +117,18 @@ def _choose(
     found.second[AGAIN].append(bool(won[others[np.argmax(lic1[others])]]))
     failed = here[first]
     shown = {FIRST_PREFIX + key: np.full(len(here), columns[key][failed]) for key in SHOWN}
-    Z = features.second.rows({key: v[here] for key, v in columns.items()} | shown).Z
-    values = second.values(Z)
+    X = SECOND.rows({key: v[here] for key, v in columns.items()} | shown).X
+    values = second.values(X)
     found.second[LOCAL].append(bool(won[others[np.argmax(values[others])]]))
     found.repeated += int(np.argmax(values) == first)
 
 
 def _gap(estimator: SuccessEstimator, seen: Vector, asked: Vector) -> Vector:
     """Returns the distance of each query from the nearest row in bandwidths; NaN without any."""
-    assert isinstance(estimator, MappedEstimator)
-    if not isinstance(estimator.inner, NearestNeighbours):
+    if not isinstance(estimator, NearestNeighbours):
         return np.full(len(asked), np.nan)
-    scaled = [Z @ estimator.matrix.T / estimator.inner.bandwidth for Z in (seen, asked)]
-    distance: Vector = cKDTree(scaled[0]).query(scaled[1])[0]
+    tree = cKDTree(seen / estimator.bandwidth_)
+    distance: Vector = tree.query(asked / estimator.bandwidth_)[0]
     return distance
 
 
@@ -244,8 +217,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True, help="Markdown file")
     args = parser.parse_args()
     columns = ExperienceLibrary(args.library).columns()
-    features = features_of(str(columns["category"][0]))
-    results = {name: hold_out_goals(name, features, columns) for name in ESTIMATORS}
+    results = {name: hold_out_goals(name, columns) for name in ESTIMATORS}
     f = columns["success"].astype(float)
     goals, environments = goal_of_each(columns).max() + 1, len(np.unique(columns["environment"]))
     tables = (first_table(results, f), second_table(results), calibration_table(results, f))

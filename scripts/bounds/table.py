@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lic_drake.errors import LibraryError
-from lic_drake.estimate.categories import features_of
+from lic_drake.estimate.features import features_of
 from lic_drake.evaluate.paper import TABLES, label
 from lic_drake.evaluate.table import Table
 from lic_drake.evaluate.trials import TrialTable, read_trials
@@ -218,7 +218,7 @@ def _experienced_estimates(held_out: Columns, results: Path) -> Vector:
 def _estimates(name: str, category: str, learned: Columns, asked: Columns) -> Vector:
     """Returns what LIC-1 estimates of reaches, shape (n,), after learning from others."""
     features = features_of(category).first
-    return fit_model(name, features, learned).estimator.values(features.rows(asked).Z)
+    return fit_model(name, features, learned).estimator.values(features.rows(asked).X)
 
 
 def _cost_score(columns: Columns) -> Vector:

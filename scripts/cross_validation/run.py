@@ -11,21 +11,54 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from lic_drake.estimate.cross_validation import (
+import numpy as np
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import ConstantKernel, Matern
+from sklearn.neighbors import KNeighborsClassifier
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+
+from lic_drake.estimate.estimator import SuccessEstimator, from_sklearn
+from lic_drake.estimate.features import PLANAR_LIC1
+from lic_drake.estimate.registry import estimator_names, make_estimator
+from lic_drake.estimate.rows import average_rows, reach_variance
+from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.types import Vector
+from scripts.common import RESULTS, make_parser, run_script
+from scripts.cross_validation.scores import (
     calibration_curve,
     hold_out_environments,
     score,
 )
-from lic_drake.estimate.estimator import Predictor
-from lic_drake.estimate.features import PLANAR_LIC1
-from lic_drake.estimate.registry import estimator_names, make_estimator
-from lic_drake.estimate.scikit_learn import PEERS
-from lic_drake.experience.store import ExperienceLibrary
-from scripts.common import RESULTS, make_parser, run_script
 
-ESTIMATORS: dict[str, Callable[[], Predictor]] = {
+
+class MaternProcess(SuccessEstimator):
+    """scikit-learn's Gaussian process with a Matern 1/2 kernel, on averaged rows."""
+
+    def _fit(self, X: Vector, y: Vector, groups: Any, weight: Vector) -> None:
+        rows = average_rows(X, y, weight)
+        # The first constant is the prior variance of the unknown mean rate.
+        kernel = ConstantKernel(1.0, "fixed") + ConstantKernel(0.05, (1e-4, 4.0)) * Matern(
+            np.ones(X.shape[1]), nu=0.5
+        )
+        process = GaussianProcessRegressor(kernel, alpha=reach_variance(rows) / rows.count)
+        self._scaler = StandardScaler().fit(X)
+        self._process = process.fit(self._scaler.transform(rows.X), rows.rate)
+
+    def _values(self, X: Vector) -> Vector:
+        return np.asarray(self._process.predict(self._scaler.transform(X)))
+
+
+def neighbours(k: int) -> SuccessEstimator:
+    """Returns scikit-learn's classifier by nearest neighbours; K=5 is its default."""
+    return from_sklearn(make_pipeline(StandardScaler(), KNeighborsClassifier(k)))
+
+
+ESTIMATORS: dict[str, Callable[[], SuccessEstimator]] = {
     **{name: partial(make_estimator, name) for name in estimator_names()},
-    **PEERS,
+    "sklearn KNN, K=5": partial(neighbours, 5),
+    "sklearn KNN, K=100": partial(neighbours, 100),
+    "sklearn GP, Matern 1/2": MaternProcess,
 }
 HEADINGS = {
     "estimator": "estimator",
@@ -69,7 +102,7 @@ def run(library: Path, names: list[str], folds: int, out: Path) -> None:
             scores.append({"estimator": "constant rate", **asdict(constant), "seconds": 0.0})
         result = score(held_out, PLANAR_LIC1.situation)
         scores.append({"estimator": name, **asdict(result), "seconds": seconds})
-        curve = calibration_curve(held_out.probability, rows.f)
+        curve = calibration_curve(held_out.probability, rows.y)
         curves += [{"estimator": name, **asdict(bin_)} for bin_ in curve]
         print(markdown(scores[-1:], HEADINGS).splitlines()[-1], flush=True)
     out.mkdir(parents=True, exist_ok=True)
@@ -77,7 +110,7 @@ def run(library: Path, names: list[str], folds: int, out: Path) -> None:
     write_csv(out / "calibration_curves.csv", curves)
     (out / "cross_validation.md").write_text(
         f"# Estimators on held-out environments\n\n"
-        f"{len(rows.f)} reaches of {library.name} in {len(set(rows.environment))} environments,"
+        f"{len(rows.y)} reaches of {library.name} in {len(set(rows.groups))} environments,"
         f" {folds} folds. The constant rate selects a start at random.\n\n"
         + markdown(scores, HEADINGS),
         encoding="utf-8",

@@ -12,15 +12,15 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import t as student_t
 
-from lic_drake.estimate.cross_validation import selection_success
-from lic_drake.estimate.estimator import Predictor
+from lic_drake.estimate.estimator import SuccessEstimator
 from lic_drake.estimate.features import PLANAR_LIC1, ExperienceRows
-from lic_drake.estimate.folds import environment_folds
 from lic_drake.estimate.registry import make_estimator
+from lic_drake.estimate.rows import group_folds
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 from lic_drake.seeds import make_generator
 from scripts.common import RESULTS, make_parser, run_script
+from scripts.cross_validation.scores import selection_success
 
 SIZES = (250, 500, 1000, 2000, 4000, 8000, 18900)
 
@@ -45,7 +45,11 @@ class LearningPoint:
 
 
 def learning_point(
-    name: str, make: Callable[[], Predictor], rows: ExperienceRows, size: int, folds: int = 10
+    name: str,
+    make: Callable[[], SuccessEstimator],
+    rows: ExperienceRows,
+    size: int,
+    folds: int = 10,
 ) -> LearningPoint:
     """Measures the selection among each held-out environment's starts, learning from `size` rows.
 
@@ -59,8 +63,8 @@ def learning_point(
         size: Number of reaches to learn from; all of the other folds' if there are fewer.
         folds: Number of groups of environments.
     """
-    fold = environment_folds(rows.environment, folds)
-    probability = np.empty(len(rows.f))
+    fold = group_folds(rows.groups, folds)
+    probability = np.empty(len(rows.y))
     sizes = []
     for held_out in range(fold.max() + 1):
         out = fold == held_out
@@ -68,8 +72,8 @@ def learning_point(
         pool = np.flatnonzero(~out)
         part = rng.choice(pool, size=min(size, len(pool)), replace=False)
         sizes.append(len(part))
-        estimator = make().fit(rows.Z[part], rows.f[part], rows.environment[part])
-        probability[out] = estimator.predict(rows.Z[out]).probability
+        estimator = make().fit(rows.X[part], rows.y[part], rows.groups[part])
+        probability[out] = estimator.predict_proba(rows.X[out])[:, 1]
     success = selection_success(probability, rows, PLANAR_LIC1.situation)
     mean, n = float(success.mean()), len(success)
     half_width = float(student_t.ppf(0.95, n - 1) * success.std(ddof=1) / np.sqrt(n))

@@ -15,10 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from lic_drake.errors import LicError, RequestError
-from lic_drake.estimate.categories import features_of
+from lic_drake.estimate.features import features_of
 from lic_drake.evaluate.table import Table
 from lic_drake.experience.schema import scenario_text
-from lic_drake.experience.second_reach import pair_reaches
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 from lic_drake.reach.pointing_starts import PointingStarts, pointing_starts
@@ -96,7 +95,7 @@ def is_possible(starts: PointingStarts, chosen: Selection) -> bool:
 
 
 def check_situation(
-    models: dict[str, tuple[SuccessModel, SuccessModel]],
+    models: dict[str, SuccessModel],
     p_WG: Vector,
     starts: PointingStarts,
     samples: int,
@@ -109,22 +108,22 @@ def check_situation(
     starts_s = time.perf_counter() - began
     sampled = sample_conditions(starts, samples, rng)
     found: dict[Key, Outcome] = {}
-    for name, (first, second) in models.items():
+    for name, model in models.items():
         failed: tuple[FailedReach, ...] = ()
         for attempt in (1, 2):
             situation = Situation(p_WG=p_WG, starts=starts, failed=failed)
-            objective = PointingLic(first, second).objective(situation)
+            objective = PointingLic(model).objective(situation)
             began = time.perf_counter()
-            allowed = grid.take(is_apart(situation, grid))
+            allowed = grid.take(is_apart(situation, grid) & situation.allowed(grid))
             of_grid = float(objective.values(allowed).max(initial=-np.inf))
             candidates_s = time.perf_counter() - began
-            others = sampled.take(is_apart(situation, sampled))
+            others = sampled.take(is_apart(situation, sampled) & situation.allowed(sampled))
             best = best_possible(starts, others, objective.values(others))
             next_failed = failed
             for kind, optimiser in OPTIMISERS.items():
                 began, value = time.perf_counter(), -np.inf
                 try:
-                    chosen = optimiser(first, second).select(situation)
+                    chosen = optimiser(model).select(situation)
                 except RequestError:
                     optimisation_s = 0.0
                 else:
@@ -194,14 +193,8 @@ def main() -> int:
     try:
         library = ExperienceLibrary(args.library)
         text, columns = scenario_text(library.scenario()), library.columns()
-        features, pairs = features_of(library.scenario().category), pair_reaches(columns)
-        models = {
-            name: (
-                fit_model(name, features.first, columns),
-                fit_model(name, features.second, pairs),
-            )
-            for name in args.estimators
-        }
+        features = features_of(library.scenario().category).first
+        models = {name: fit_model(name, features, columns) for name in args.estimators}
         tables = []
         for blocked in args.blocked:
             scenario = parse_scenario(text, f"{{clutter: {{num_blocked: {blocked}}}}}")

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lic_drake.estimate.categories import features_of
+from lic_drake.estimate.features import features_of
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 from lic_drake.reach.start import Starts

@@ -10,10 +10,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from lic_drake.estimate.cross_validation import CalibrationBin
 from lic_drake.evaluate.paper import LABELS, label
 from lic_drake.evaluate.statistics import Count
 from lic_drake.types import Vector
+from scripts.cross_validation.scores import CalibrationBin
 from scripts.learning_curve.run import LearningPoint
 
 COLORS = {"rnd": "tab:gray", "cost": "tab:orange", "gp": "tab:blue", "knn": "tab:green"}

@@ -13,7 +13,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from lic_drake.errors import LibraryError
-from lic_drake.estimate.cross_validation import CalibrationBin, calibration_curve
 from lic_drake.evaluate.paper import TABLES, label
 from lic_drake.evaluate.statistics import count
 from lic_drake.evaluate.tables import LEARNED, METHODS
@@ -21,6 +20,7 @@ from lic_drake.evaluate.trials import TrialTable
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.show.plots import save_figure
 from scripts.common import add_results, load_trials, make_parser, run_script
+from scripts.cross_validation.scores import CalibrationBin, calibration_curve
 from scripts.learning_curve.run import LearningPoint
 from scripts.tables.drawing import (
     AttemptCounts,

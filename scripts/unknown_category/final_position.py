@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.distance import cdist
 from scipy.special import logsumexp
 
-from lic_drake.estimate.checks import EstimateError, feature_scale
+from lic_drake.errors import EstimateError
 from lic_drake.estimate.features import FeatureMap
-from lic_drake.estimate.folds import selection_folds
+from lic_drake.estimate.rows import feature_scale, selection_folds
 from lic_drake.seeds import make_generator
 from lic_drake.types import Vector
 
@@ -60,15 +60,15 @@ class FinalPositions:
         p_WE = np.column_stack([columns["final_x"], columns["final_y"]]).astype(float)
         zeros = np.zeros(len(p_WE))
         base = np.column_stack([columns.get("base_x", zeros), columns.get("base_y", zeros)])
-        failed = (rows.f == 0.0) & np.isfinite(p_WE).all(axis=1)
+        failed = (rows.y == 0.0) & np.isfinite(p_WE).all(axis=1)
         if not failed.any():
             raise EstimateError(
                 "the library has no failed reach with a final position, from which to learn where"
                 " failures end; use the mixture without final positions"
             )
-        Z, p_RE = rows.Z[failed], (p_WE - base)[failed]
+        Z, p_RE = rows.X[failed], (p_WE - base)[failed]
         scale = feature_scale(Z)
-        fold = selection_folds(rows.environment[failed], len(Z))
+        fold = selection_folds(rows.groups[failed], len(Z))
         candidates = [
             cls(Z=Z / (nearness * scale), scale=nearness * scale, p_RE=p_RE, width_m=width_m)
             for nearness in _NEARNESS

@@ -1,16 +1,22 @@
-import pickle
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.stats import multivariate_normal
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, PairwiseKernel
+from sklearn.metrics.pairwise import laplacian_kernel
 
-from lic_drake.estimate.averaging import average_rows
-from lic_drake.estimate.checks import EstimateError
-from lic_drake.estimate.gaussian_process import GaussianProcess
-from lic_drake.estimate.likelihood import Hyperparameters
+from lic_drake.errors import EstimateError
+from lic_drake.estimate.gaussian_process import (
+    GaussianProcess,
+    Hyperparameters,
+    coordinate_distances,
+    fit_hyperparameters,
+    l1_correlation,
+    negative_log_likelihood,
+)
+from lic_drake.estimate.rows import AveragedRows, average_rows, reach_variance
 
 PRIOR = Hyperparameters(
     theta=np.array([2.0, 1.0, 3.0, 0.5]),
@@ -20,99 +26,82 @@ PRIOR = Hyperparameters(
 )
 
 
-def test_predictions_equal_those_of_scikit_learn(world) -> None:
+def test_with_one_scale_the_kernel_is_scikit_learns_laplacian_and_not_matern() -> None:
+    rng = np.random.default_rng(0)
+    A, B = rng.normal(size=(5, 4)), rng.normal(size=(3, 4))
+    expected = laplacian_kernel(A, B, gamma=0.7)
+    np.testing.assert_allclose(l1_correlation(A, B, np.full(4, 0.7)), expected)
+    correlation = l1_correlation(np.zeros((1, 2)), np.ones((1, 2)), np.ones(2))
+    assert correlation.item() == pytest.approx(np.exp(-2.0))
+
+
+@pytest.mark.parametrize("weighted", [False, True])
+def test_values_equal_those_of_scikit_learn(world, weighted: bool) -> None:
     library = world.library(environments=3)
-    ours = GaussianProcess(hyperparameters=PRIOR).fit(library.Z[::5], library.f[::5])
-    rows = average_rows(library.Z[::5], library.f[::5])
+    X, y = library.X[::5], library.y[::5]
+    weight = np.linspace(0.5, 20.0, len(y)) if weighted else None
+    ours = GaussianProcess(PRIOR).fit(X, y, sample_weight=weight)
+    rows = average_rows(X, y, weight)
     # A constant kernel of large variance is an unknown mean; per-dimension scales are features
     # in other units.
     theirs = GaussianProcessRegressor(
         ConstantKernel(1e4) + ConstantKernel(0.05) * PairwiseKernel(metric="laplacian"),
         alpha=0.2 / rows.count + 0.003,
         optimizer=None,
-    ).fit(rows.Z * PRIOR.theta, rows.rate)
-    queries = world.library(1).Z[::40] + 0.03
-    mean, spread = theirs.predict(queries * PRIOR.theta, return_std=True)
-    prediction = ours.predict(queries)
-    np.testing.assert_allclose(prediction.probability, np.clip(mean, 0.0, 1.0), atol=1e-6)
-    np.testing.assert_allclose(prediction.spread, spread, rtol=1e-4)
+    ).fit(rows.X * PRIOR.theta, rows.rate)
+    queries = world.grid()[::40] + 0.03
+    np.testing.assert_allclose(
+        ours.values(queries), theirs.predict(queries * PRIOR.theta), atol=1e-6
+    )
 
 
 @settings(max_examples=50)
 @given(st.integers(0, 10_000))
-def test_value_and_gradient_agree_with_predict_and_finite_differences(seed: int) -> None:
+def test_value_and_gradient_agree_with_values_and_finite_differences(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    Z = rng.uniform(size=(20, 4))
-    process = GaussianProcess(hyperparameters=PRIOR).fit(Z, rng.integers(0, 2, 20))
-    z = rng.uniform(size=4)
-    h = min(1e-5, 0.4 * np.abs(z - Z).min())
-    value, gradient = process.value_and_gradient(z)
-    numeric = [
-        (process.value_and_gradient(z + h * e)[0] - process.value_and_gradient(z - h * e)[0])
-        / (2.0 * h)
-        for e in np.eye(4)
-    ]
-    np.testing.assert_allclose(gradient, numeric, rtol=1e-4, atol=1e-5)
-    assert np.clip(value, 0.0, 1.0) == pytest.approx(process.predict([z]).probability[0])
+    X = rng.uniform(size=(20, 4))
+    process = GaussianProcess(PRIOR).fit(X, rng.integers(0, 2, 20))
+    x = rng.uniform(size=4)
+    h = min(1e-5, 0.4 * np.abs(x - X).min())
+    value, gradient = process.value_and_gradient(x)
+    up, down = process.values(x + h * np.eye(4)), process.values(x - h * np.eye(4))
+    np.testing.assert_allclose(gradient, (up - down) / (2.0 * h), rtol=1e-4, atol=1e-5)
+    assert value == pytest.approx(process.values([x])[0])
 
 
-def test_averaging_leaves_the_estimate_as_it_is_where_noise_is_that_of_single_reaches(
-    world,
-) -> None:
-    library = world.library(environments=4)
-    Z, f = library.Z[::9], library.f[::9]
-    Z, f = np.vstack([Z, Z]), np.concatenate([f, 1.0 - f])
-    prior = Hyperparameters(
-        theta=PRIOR.theta, signal_variance=0.05, noise_floor=0.0, reach_variance=0.2
-    )
-    averaged = GaussianProcess(hyperparameters=prior).fit(Z, f).predict(Z[:50] + 0.01)
-    raw = GaussianProcess(average=False, hyperparameters=prior).fit(Z, f).predict(Z[:50] + 0.01)
-    np.testing.assert_allclose(averaged.probability, raw.probability, rtol=1e-8)
-    np.testing.assert_allclose(averaged.spread, raw.spread, rtol=1e-6)
+def test_at_a_kink_the_gradient_is_the_mean_of_both_sides(scattered) -> None:
+    process = GaussianProcess(PRIOR).fit(scattered.X, scattered.y)
+    x, h = scattered.X[4], 1e-7 * np.eye(4)
+    at, up, down = (process.values(points) for points in (np.tile(x, (4, 1)), x + h, x - h))
+    sides = (up - at) / 1e-7, (at - down) / 1e-7
+    assert np.abs(sides[0] - sides[1]).max() > 0.01
+    gradient = process.value_and_gradient(x)[1]
+    np.testing.assert_allclose(gradient, np.mean(sides, axis=0), atol=1e-5)
 
 
-def test_the_spread_covers_the_true_probability_as_often_as_it_says(world) -> None:
-    library = world.library(environments=8)
-    grid = world.grid()
-    prediction = GaussianProcess().fit(library.Z, library.f, library.environment).predict(grid)
-    error = np.abs(prediction.probability - world.probability(grid)) / prediction.spread
-    assert 0.8 < np.mean(error < 1.645) <= 1.0
-    assert np.mean(error < 0.5) < 0.7
+def test_luck_shared_within_environments_is_not_read_as_surface(world) -> None:
+    library = type(world)(relief=0.3).library(environments=8, shared_luck=0.4)
+    knowing = GaussianProcess().fit(library.X, library.y, library.groups).hyperparameters_
+    unknowing = GaussianProcess().fit(library.X, library.y).hyperparameters_
+    assert knowing.reach_variance > unknowing.reach_variance
 
 
-def test_luck_shared_within_environments_raises_the_noise(flat_world) -> None:
-    alike = flat_world.library(environments=8, shared_luck=0.4)
-    knowing = GaussianProcess().fit(alike.Z, alike.f, alike.environment)
-    unknowing = GaussianProcess().fit(alike.Z, alike.f)
-    assert knowing.hyperparameters.reach_variance > unknowing.hyperparameters.reach_variance
-    grid = flat_world.grid()
-    truth = flat_world.probability(grid)
-    error = {
-        process: np.mean((process.predict(grid).probability - truth) ** 2)
-        for process in (knowing, unknowing)
-    }
-    assert error[knowing] < error[unknowing]
+def test_conditioning_keeps_hyperparameters_and_takes_the_rows(scattered) -> None:
+    process = GaussianProcess().fit(scattered.X, scattered.y, scattered.groups)
+    part = process.conditioned_on(scattered.X[:20], scattered.y[:20])
+    np.testing.assert_array_equal(part.hyperparameters_.theta, process.hyperparameters_.theta)
+    expected = GaussianProcess(process.hyperparameters_).fit(scattered.X[:20], scattered.y[:20])
+    x = scattered.X[30]
+    assert part.value_and_gradient(x)[0] == expected.value_and_gradient(x)[0]
+    assert part.value_and_gradient(x)[0] != process.value_and_gradient(x)[0]
 
 
-def test_conditioning_keeps_the_hyperparameters_and_takes_the_rows(scattered) -> None:
-    process = GaussianProcess().fit(scattered.Z, scattered.f, scattered.environment)
-    part = process.conditioned_on(scattered.Z[:20], scattered.f[:20])
-    assert part.hyperparameters is process.hyperparameters
-    expected = GaussianProcess(hyperparameters=process.hyperparameters).fit(
-        scattered.Z[:20], scattered.f[:20]
-    )
-    z = scattered.Z[30]
-    assert part.value_and_gradient(z)[0] == expected.value_and_gradient(z)[0]
-    assert part.value_and_gradient(z)[0] != process.value_and_gradient(z)[0]
-
-
-@pytest.mark.parametrize("outcome", [0.0, 1.0])
-def test_if_every_reach_ends_alike_that_is_the_estimate(world, outcome: float) -> None:
-    Z = world.library(environments=2).Z[::11]
-    process = GaussianProcess().fit(Z, np.full(len(Z), outcome))
-    prediction = process.predict(Z[:5] + 0.05)
-    np.testing.assert_allclose(prediction.probability, outcome, atol=1e-6)
-    assert np.all(prediction.spread > 0.0)
+def test_a_weight_counts_as_that_many_equal_reaches(scattered) -> None:
+    X, y, groups = scattered.X, scattered.y, scattered.groups
+    count = np.arange(60) % 3 + 1
+    weighted = GaussianProcess().fit(X, y, groups, count)
+    repeated = GaussianProcess().fit(*(np.repeat(part, count, axis=0) for part in (X, y, groups)))
+    np.testing.assert_allclose(weighted.values(X + 0.02), repeated.values(X + 0.02), atol=1e-6)
 
 
 def test_a_single_row_gives_a_flat_estimate() -> None:
@@ -125,40 +114,96 @@ def test_a_single_row_gives_a_flat_estimate() -> None:
 def test_a_feature_that_never_varies_has_no_influence() -> None:
     rng = np.random.default_rng(0)
     varying = rng.uniform(size=(40, 1))
-    f = (varying[:, 0] > 0.5).astype(float)
-    process = GaussianProcess().fit(np.column_stack([np.full(40, 0.335), varying]), f)
-    low, high = process.predict([[0.335, 0.1], [0.335, 0.9]]).probability
+    y = (varying[:, 0] > 0.5).astype(float)
+    process = GaussianProcess().fit(np.column_stack([np.full(40, 0.335), varying]), y)
+    low, high = process.values([[0.335, 0.1], [0.335, 0.9]])
     assert low < 0.3 < 0.7 < high
 
 
 def test_settings_of_many_rows_come_from_a_part_and_the_estimate_from_all(world) -> None:
     rng = np.random.default_rng(0)
-    Z = rng.uniform([0.4, -0.4, -0.4, -1.0], [0.8, 0.4, 0.4, 1.5], (1500, 4))
-    f = (rng.random(1500) < world.probability(Z)).astype(float)
-    process = GaussianProcess().fit(Z, f, np.arange(1500) // 10)
-    expected = GaussianProcess(hyperparameters=process.hyperparameters).fit(Z, f)
-    queries = rng.uniform([0.4, -0.4, -0.4, -1.0], [0.8, 0.4, 0.4, 1.5], (200, 4))
+    low, high = [0.4, -0.4, -0.4, -1.0], [0.8, 0.4, 0.4, 1.5]
+    X, queries = rng.uniform(low, high, (1500, 4)), rng.uniform(low, high, (200, 4))
+    y = (rng.random(1500) < world.probability(X)).astype(float)
+    process = GaussianProcess().fit(X, y, np.arange(1500) // 10)
+    expected = GaussianProcess(process.hyperparameters_).fit(X, y)
     np.testing.assert_array_equal(process.values(queries), expected.values(queries))
     truth = world.probability(queries)
     assert np.mean((process.values(queries) - truth) ** 2) < 0.3 * np.var(truth)
 
 
 def test_more_rows_than_memory_allows_are_refused() -> None:
-    process = GaussianProcess(hyperparameters=PRIOR)
-    with pytest.raises(EstimateError, match=r"at most 8000 .* got 8001.*'gp-raw'"):
-        process.fit(np.arange(4.0 * 8001).reshape(8001, 4), np.zeros(8001))
+    with pytest.raises(EstimateError, match=r"at most 8000 .* got 8001.*'knn'"):
+        GaussianProcess(PRIOR).fit(np.arange(4.0 * 8001).reshape(8001, 4), np.zeros(8001))
 
 
-def test_asking_before_fitting_says_what_to_do() -> None:
-    process = GaussianProcess()
-    with pytest.raises(EstimateError, match="call fit"):
-        process.predict(np.zeros((1, 4)))
-    with pytest.raises(EstimateError, match="call fit"):
-        process.value_and_gradient(np.zeros(4))
+# The likelihood
 
 
-def test_a_fitted_process_survives_pickling(scattered) -> None:
-    process = GaussianProcess(hyperparameters=PRIOR).fit(scattered.Z, scattered.f)
-    copy = pickle.loads(pickle.dumps(process))
-    z = scattered.Z[0] + 0.01
-    assert copy.value_and_gradient(z)[0] == process.value_and_gradient(z)[0]
+def _problem(seed: int, n: int = 12, d: int = 3):
+    rng = np.random.default_rng(seed)
+    X, y = rng.normal(size=(n, d)), rng.random(n)
+    noise = rng.uniform(0.01, 0.2, n)
+    log_parameters = rng.uniform(-2.0, 1.0, d + 2)
+    return log_parameters, coordinate_distances(X), y, noise
+
+
+def test_the_likelihood_is_that_of_a_multivariate_normal_at_its_best_mean() -> None:
+    log_parameters, distances, y, noise = _problem(1)
+    *theta, signal, floor = np.exp(log_parameters)
+    covariance = signal * np.exp(-sum(t * D for t, D in zip(theta, distances, strict=True)))
+    covariance += np.diag(noise + floor)
+    densities = [
+        multivariate_normal(np.full(len(y), mu), covariance).logpdf(y)
+        for mu in np.linspace(-1.0, 2.0, 3001)
+    ]
+    constant = 0.5 * len(y) * np.log(2.0 * np.pi)
+    value, _ = negative_log_likelihood(log_parameters, distances, y, noise)
+    assert value == pytest.approx(-max(densities) - constant, abs=1e-4)
+
+
+@settings(max_examples=30)
+@given(st.integers(0, 10_000))
+def test_its_gradient_equals_finite_differences(seed: int) -> None:
+    log_parameters, *data = _problem(seed)
+    _, gradient = negative_log_likelihood(log_parameters, *data)
+    h = 1e-5
+    numeric = [
+        (
+            negative_log_likelihood(log_parameters + h * e, *data)[0]
+            - negative_log_likelihood(log_parameters - h * e, *data)[0]
+        )
+        / (2.0 * h)
+        for e in np.eye(len(log_parameters))
+    ]
+    np.testing.assert_allclose(gradient, numeric, rtol=1e-5, atol=1e-6)
+
+
+def test_the_search_finds_parameters_about_as_likely_as_the_true_ones_or_more() -> None:
+    rng = np.random.default_rng(3)
+    X = rng.uniform(size=(150, 2))
+    theta, signal, floor, noise = np.array([6.0, 1.0]), 0.05, 0.002, np.full(150, 0.005)
+    distances = coordinate_distances(X)
+    covariance = signal * np.exp(-np.tensordot(theta, distances, axes=1))
+    covariance += np.diag(noise + floor)
+    y = 0.6 + np.linalg.cholesky(covariance) @ rng.standard_normal(150)
+    rows = AveragedRows(X=X, rate=y, count=np.ones(150), member=np.arange(150))
+    found = fit_hyperparameters(rows, reach_variance=0.005)
+
+    def misfit(theta, signal, floor) -> float:
+        return negative_log_likelihood(np.log([*theta, signal, floor]), distances, y, noise)[0]
+
+    assert misfit(found.theta, found.signal_variance, found.noise_floor) <= misfit(
+        theta, signal, floor
+    )
+    assert found.theta[0] > 2.0 * found.theta[1]
+
+
+def test_scales_follow_the_units_of_the_features(world) -> None:
+    library = world.library(environments=4)
+    unit = np.array([1.0, 100.0, 1e-3, 57.3])
+    rows = average_rows(library.X[::7], library.y[::7])
+    others = average_rows(library.X[::7] * unit, library.y[::7])
+    variance = reach_variance(rows)
+    found, scaled = (fit_hyperparameters(r, variance) for r in (rows, others))
+    np.testing.assert_allclose(scaled.theta * unit, found.theta, rtol=1e-3)

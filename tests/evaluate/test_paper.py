@@ -124,4 +124,4 @@ def test_tables_are_found_by_category_and_strategies_have_the_papers_names() -> 
         "cylinder-aperture-clutter": "IV",
     }
     assert [label(method) for method in TABLE_I.columns] == list(LABELS.values())
-    assert label("gp-raw") == "gp-raw"
+    assert label("boosting") == "boosting"

@@ -10,7 +10,7 @@ from types import ModuleType
 import pytest
 
 from lic_drake.clutter import registry as clutter
-from lic_drake.estimate import categories
+from lic_drake.estimate import features as categories
 from lic_drake.estimate import registry as estimate
 from lic_drake.robots import registry as robots
 

@@ -4,13 +4,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lic_drake.estimate.categories import features_of
 from lic_drake.estimate.features import ExperienceRows, FeatureMap
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 from lic_drake.types import Vector
 from scripts.ablation import run, space_features
-from scripts.ablation.space_features import AGAIN, LOCAL, PLAIN, RELATIVE, second_table
+from scripts.ablation.space_features import AGAIN, LOCAL, RELATIVE, second_table
 from scripts.cross_validation import run as cross_validation
 
 
@@ -47,7 +46,7 @@ def test_the_standard_error_is_that_of_independent_environments() -> None:
 class Spy:
     """Refuses to be asked about what it was fitted to."""
 
-    def fit(self, X: Vector, y: Vector, environment: Vector) -> "Spy":
+    def fit(self, X: Vector, y: Vector, groups: Vector) -> "Spy":
         self.seen = set(X[:, 0])
         return self
 
@@ -58,9 +57,14 @@ class Spy:
 
 def test_fits_never_see_the_fold_they_are_asked_about() -> None:
     fold = np.arange(30) % 3
-    Z = np.column_stack([fold, np.arange(30.0)])
     asked = np.arange(30) < 20
-    rows = ExperienceRows(Z=Z, f=np.zeros(30), environment=fold)
+    rows = ExperienceRows(
+        X=np.column_stack([fold, np.arange(30.0)]),
+        y=np.zeros(30),
+        groups=fold,
+        weight=np.ones(30),
+        simulated=np.ones(30, dtype=bool),
+    )
     values = run.held_out_values(Spy, rows, fold, asked)
     np.testing.assert_array_equal(values[asked], np.arange(20.0))
     assert np.isnan(values[~asked]).all()
@@ -90,34 +94,27 @@ def test_the_ablation_tabulates_first_and_second_reaches(
 class Recalls:
     """Remembers which goals it was told, and likes starts near the goal."""
 
-    def __init__(self, features: FeatureMap) -> None:
-        self.goal, self.start = (
-            [features.names.index(f"{thing}_{axis}") for axis in "yz"]
-            for thing in ("goal", "start")
-        )
+    def __init__(self, name: str, features: FeatureMap) -> None:
+        self.goal = features.goal_matrix
+        self.start = np.eye(len(features.names))[features.decision][:2]
 
-    def fit(self, X: Vector, y: Vector, environment: Vector) -> "Recalls":
-        self.seen = {tuple(row) for row in np.round(X[:, self.goal], 6)}
+    def fit(self, X: Vector, y: Vector, groups: Vector) -> "Recalls":
+        self.seen = {tuple(row) for row in np.round(X @ self.goal.T, 6)}
         return self
 
     def values(self, X: Vector) -> Vector:
-        assert not self.seen & {tuple(row) for row in np.round(X[:, self.goal], 6)}
-        return -np.linalg.norm(X[:, self.start] - X[:, self.goal], axis=1)
+        assert not self.seen & {tuple(row) for row in np.round(X @ self.goal.T, 6)}
+        return -np.round(np.linalg.norm(X @ (self.start - self.goal).T, axis=1), 6)
 
 
 def test_goals_in_space_are_held_out_and_second_starts_are_other_ones(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def make(name: str, features: FeatureMap) -> Recalls:
-        return Recalls(features)
-
-    monkeypatch.setattr(space_features, "FIRSTS", {PLAIN: make, RELATIVE: make})
-    monkeypatch.setattr(space_features, "local_second", make)
+    monkeypatch.setattr(space_features, "make_estimator", Recalls)
     monkeypatch.setattr(space_features, "_gap", lambda *_: np.nan)
     columns = ExperienceLibrary(shipped_library("sphere-aperture-clutter")).columns()
     few = {key: values[columns["environment"] < 8] for key, values in columns.items()}
-    features = features_of("sphere-aperture-clutter")
-    found = space_features.hold_out_goals("gp", features, few)
+    found = space_features.hold_out_goals("gp", few)
     failures = found.won[RELATIVE].count(False)
     assert len(found.won[RELATIVE]) == 8 * 12
     # An estimate that knows nothing of the failure chooses as LIC-1, and would repeat itself.

@@ -5,9 +5,9 @@ from matplotlib.collections import QuadMesh
 from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 
-from lic_drake.estimate.cross_validation import CalibrationBin
 from lic_drake.evaluate.statistics import Count
 from lic_drake.intervals import wilson_interval
+from scripts.cross_validation.scores import CalibrationBin
 from scripts.tables.drawing import (
     AttemptCounts,
     draw_calibration,

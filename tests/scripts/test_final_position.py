@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from lic_drake.estimate.checks import EstimateError
+from lic_drake.errors import EstimateError
 from lic_drake.estimate.features import PLANAR_LIC1
 from scripts.unknown_category.final_position import OUTLIERS, FinalPositions
 
@@ -44,7 +44,7 @@ def test_it_comes_near_the_density_that_the_failures_were_drawn_from() -> None:
     rows = PLANAR_LIC1.rows(unseen)
     ours, truth = [], []
     for z, x, y, start_y in zip(
-        rows.Z, unseen["final_x"], unseen["final_y"], unseen["start_y"], strict=True
+        rows.X, unseen["final_x"], unseen["final_y"], unseen["start_y"], strict=True
     ):
         ours.append(final.log_density(z, [[x, y]])[0])
         squared = ((x - 0.5) ** 2 + (y - 0.5 * start_y) ** 2) / spread**2

@@ -8,8 +8,7 @@ from numpy.typing import ArrayLike
 from support.select_surfaces import Bumps, random_model
 from support.starts import ARM, LINE
 
-from lic_drake.estimate.categories import features_of
-from lic_drake.estimate.features import PLANAR_LIC1
+from lic_drake.estimate.features import PLANAR_LIC1, features_of
 from lic_drake.reach.start import Start, Starts
 from lic_drake.select.objective import SuccessModel
 from lic_drake.select.planar_lic import PlanarLic

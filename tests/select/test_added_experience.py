@@ -3,14 +3,11 @@
 import numpy as np
 import pytest
 from support.fake_reach import fill_library
-from support.select_surfaces import Bumps
 from support.starts import ARM
 
-from lic_drake.estimate.checks import EstimateError
 from lic_drake.estimate.features import PLANAR_LIC1
 from lic_drake.experience.added import add_records, added_columns
 from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.select import registry
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.registry import fit_model, make_selector
 from lic_drake.types import Vector
@@ -60,11 +57,25 @@ def test_the_second_attempts_estimates_learn_from_added_pairs(library: Experienc
     assert before[0] != pytest.approx(0.5, abs=0.05)
 
 
-def test_an_estimator_that_cannot_go_on_learning_says_so(
-    library: ExperienceLibrary, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    fixed = Bumps(np.zeros((1, 2)), np.ones(1), np.ones(2))
-    monkeypatch.setattr(registry, "make_estimator", lambda name, features: fixed)
-    assert fit_model("mine", PLANAR_LIC1, library.columns()).estimator is fixed
-    with pytest.raises(EstimateError, match="'mine' has no method `update`"):
-        fit_model("mine", PLANAR_LIC1, library.columns(), added_columns(library))
+def test_settings_come_from_the_simulation_alone(library: ExperienceLibrary) -> None:
+    columns, added = library.columns(), added_columns(library)
+    plain = fit_model("knn", PLANAR_LIC1, columns)
+    assert fit_model("knn", PLANAR_LIC1, columns, {**added, "success": np.zeros(0)}) is not plain
+    conditioned = fit_model("knn", PLANAR_LIC1, columns, added)
+    np.testing.assert_array_equal(conditioned.estimator.bandwidth_, plain.estimator.bandwidth_)
+
+
+def test_source_and_weight_may_be_columns_of_the_library(library: ExperienceLibrary) -> None:
+    columns, added = library.columns(), added_columns(library)
+    n, more = len(columns["success"]), len(added["success"])
+    both = {
+        name: np.concatenate([values, added[name]])
+        for name, values in columns.items()
+        if name in added
+    }
+    both["weight"] = np.concatenate([np.ones(n), added["weight"]])
+    both["source"] = np.repeat(["simulation", "lab"], [n, more])
+    apart, together = (
+        fit_model("knn", PLANAR_LIC1, *data).estimator for data in ((columns, added), (both,))
+    )
+    np.testing.assert_allclose(together.values(QUERY), apart.values(QUERY), rtol=1e-12)

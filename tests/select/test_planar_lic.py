@@ -4,8 +4,7 @@ from support.select_surfaces import Bumps, random_bumps, random_model
 from support.starts import APERTURES, ARM, LINE, aperture_starts, assert_possible, dense_scan
 
 from lic_drake.errors import RequestError
-from lic_drake.estimate.categories import features_of
-from lic_drake.estimate.features import PLANAR_LIC1
+from lic_drake.estimate.features import PLANAR_LIC1, features_of
 from lic_drake.reach.start import Start, Starts
 from lic_drake.reach.starts import ApertureStarts, LineStarts
 from lic_drake.select.objective import SuccessModel

@@ -1,11 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.pr2_reaches import SCENARIO
 from support.pr2_reference import link_poses
 
 from lic_drake.errors import RequestError
-from lic_drake.estimate.categories import features_of
-from lic_drake.estimate.features import SPACE_LIC1
+from lic_drake.estimate.features import FeatureMap
 from lic_drake.experience.second_reach import SHOWN
 from lic_drake.reach.pointing_starts import PointingStarts, pointing_starts
 from lic_drake.reach.scenario import load_scenario
@@ -18,6 +19,8 @@ from lic_drake.select.registry import make_selector
 from lic_drake.select.situation import FailedReach, Situation
 
 BLOCKED = load_scenario("sphere-aperture-clutter", "{clutter: {num_blocked: 10}}")
+
+IN_SPACE = FeatureMap(goal=("goal_y", "goal_z"), start=("start_y", "start_z", "start_qx"))
 
 
 class Ridge:
@@ -33,7 +36,7 @@ class Ridge:
     scale = np.array([0.0, 0.0, 3.0, 3.0, 0.3])
 
 
-MODEL = SuccessModel(estimator=Ridge(), features=SPACE_LIC1)  # type: ignore[arg-type]
+MODEL = SuccessModel(estimator=Ridge(), features=IN_SPACE)  # type: ignore[arg-type]
 
 
 def situation(environment: int, *failed: FailedReach) -> Situation:
@@ -89,7 +92,7 @@ def test_a_peak_between_places_of_the_lattice_is_found() -> None:
         def value_and_gradient(self, z: np.ndarray) -> tuple[float, np.ndarray]:
             return float(self.values(z[None])[0]), np.zeros(5)
 
-    model = SuccessModel(estimator=Peaks(), features=SPACE_LIC1)  # type: ignore[arg-type]
+    model = SuccessModel(estimator=Peaks(), features=IN_SPACE)  # type: ignore[arg-type]
     chosen = PointingLic(model).select(situation(3))
     assert chosen.probability == pytest.approx(1.0, abs=0.03)
 
@@ -121,7 +124,7 @@ def test_a_further_attempt_goes_through_another_aperture() -> None:
 
 
 def test_lic_2_knows_where_the_first_reach_began() -> None:
-    features = SPACE_LIC1
+    features = IN_SPACE
     observed = ("first_start_y", "first_start_z")
 
     class Away:
@@ -195,7 +198,7 @@ def test_no_place_between_those_of_the_grid_is_better() -> None:
 def test_a_further_attempt_with_lic_2_does_not_begin_where_the_first_one_failed() -> None:
     model = SuccessModel(
         estimator=Blind(),  # type: ignore[arg-type]
-        features=features_of("sphere-aperture-clutter").second,
+        features=replace(IN_SPACE, observed=("first_start_y", "first_start_z")),
     )
     selector = PointingLic(MODEL, model)
     first = selector.select(situation(0))

@@ -5,11 +5,13 @@ import pytest
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, InitializeAutoDiff
 from support.pr2_reaches import SCENARIO
 
-from lic_drake.estimate.features import SPACE_LIC1
+from lic_drake.estimate.features import FeatureMap
 from lic_drake.reach.pointing_starts import PointingStarts
 from lic_drake.reach.starts import make_starts
 from lic_drake.select.objective import Objective, SuccessModel
 from lic_drake.select.pointing_program import CLEARANCE_M, PointingProgram
+
+IN_SPACE = FeatureMap(goal=("goal_y", "goal_z"), start=("start_y", "start_z", "start_qx"))
 
 
 class Hill:
@@ -35,7 +37,7 @@ def objective(top_y: float, top_z: float, qx: float | None = None) -> Objective:
     """Wants the start at a place relative to b0, and, if given, a roll of the tool."""
     top = np.array([0.0, 0.0, top_y, top_z, 0.0 if qx is None else qx])
     weight = np.array([0.0, 0.0, 1.0, 1.0, 0.0 if qx is None else 0.1])
-    model = SuccessModel(estimator=Hill(top, weight), features=SPACE_LIC1)  # type: ignore[arg-type]
+    model = SuccessModel(estimator=Hill(top, weight), features=IN_SPACE)  # type: ignore[arg-type]
     return Objective(model=model, p_WG=P_WG)
 
 

@@ -3,8 +3,9 @@ import pytest
 from sklearn.metrics import brier_score_loss
 from sklearn.metrics import log_loss as sklearn_log_loss
 
-from lic_drake.estimate.checks import EstimateError
-from lic_drake.estimate.cross_validation import (
+from lic_drake.errors import EstimateError
+from lic_drake.estimate.features import ExperienceRows
+from scripts.cross_validation.scores import (
     brier_score,
     calibration_curve,
     hold_out_environments,
@@ -12,8 +13,6 @@ from lic_drake.estimate.cross_validation import (
     score,
     selection_success,
 )
-from lic_drake.estimate.estimator import Prediction
-from lic_drake.estimate.features import ExperienceRows
 
 
 class EnvironmentSpy:
@@ -22,32 +21,37 @@ class EnvironmentSpy:
     def __init__(self, log: list[tuple[set[float], set[float]]]) -> None:
         self.log = log
 
-    def fit(self, Z, f, environment):
-        assert np.array_equal(Z[:, 0], environment)
-        self.seen = set(Z[:, 0])
+    def fit(self, X, y, groups):
+        assert np.array_equal(X[:, 0], groups)
+        self.seen = set(X[:, 0])
         return self
 
-    def predict(self, Z):
-        self.log.append((self.seen, set(Z[:, 0])))
-        return Prediction(probability=np.full(len(Z), 0.5), spread=np.zeros(len(Z)))
+    def predict_proba(self, X):
+        self.log.append((self.seen, set(X[:, 0])))
+        return np.full((len(X), 2), 0.5)
 
 
 class Memory:
     """Predicts what it has seen of the same features, else the rate: overfits all it can."""
 
-    def fit(self, Z, f, environment):
-        self.rate = f.mean()
-        self.known = dict(zip(map(tuple, Z), f, strict=True))
+    def fit(self, X, y, groups):
+        self.rate = y.mean()
+        self.known = dict(zip(map(tuple, X), y, strict=True))
         return self
 
-    def predict(self, Z):
-        p = np.array([self.known.get(tuple(z), self.rate) for z in Z])
-        return Prediction(probability=p, spread=np.zeros(len(Z)))
+    def predict_proba(self, X):
+        p = np.array([self.known.get(tuple(x), self.rate) for x in X])
+        return np.column_stack([1.0 - p, p])
 
 
-def _rows(Z, f, environment) -> ExperienceRows:
+def _rows(X, y, groups) -> ExperienceRows:
+    n = len(y)
     return ExperienceRows(
-        Z=np.asarray(Z, float), f=np.asarray(f, float), environment=np.asarray(environment)
+        X=np.asarray(X, float),
+        y=np.asarray(y, float),
+        groups=np.asarray(groups),
+        weight=np.ones(n),
+        simulated=np.ones(n, dtype=bool),
     )
 
 
@@ -65,8 +69,8 @@ def test_no_fit_sees_an_environment_that_it_predicts(folds: int, fits: int) -> N
 
 def test_learning_by_heart_gains_nothing_on_coin_tosses() -> None:
     rng = np.random.default_rng(0)
-    Z = np.tile(np.arange(50.0)[:, None], (4, 1))
-    rows = _rows(Z, rng.integers(0, 2, 200), np.repeat(np.arange(4), 50))
+    X = np.tile(np.arange(50.0)[:, None], (4, 1))
+    rows = _rows(X, rng.integers(0, 2, 200), np.repeat(np.arange(4), 50))
     result = score(hold_out_environments(Memory, rows), slice(0, 1))
     assert result.gain < -1.0
     assert result.log_loss > np.log(2.0)
@@ -77,7 +81,7 @@ def test_gain_is_against_the_rate_of_the_other_environments() -> None:
     held_out = hold_out_environments(Memory, rows)
     np.testing.assert_allclose(held_out.constant, [0.5, 0.5, 1.0, 1.0])
     gain = held_out.gain_by_environment()
-    expected = log_loss(held_out.constant, rows.f) - log_loss(held_out.probability, rows.f)
+    expected = log_loss(held_out.constant, rows.y) - log_loss(held_out.probability, rows.y)
     assert gain.mean() == pytest.approx(expected)
     result = score(held_out, slice(0, 1))
     assert result.gain_error == pytest.approx(abs(gain[0] - gain[1]) / 2.0)
@@ -106,8 +110,8 @@ def test_the_calibration_curve_counts_and_averages_each_bin() -> None:
 
 def test_selection_goes_to_the_best_score_within_environment_and_goal() -> None:
     #              goal, start
-    Z = [[0, 0], [0, 1], [1, 0], [1, 1], [0, 0], [0, 1]]
-    rows = _rows(Z, [1, 0, 0, 1, 0, 1], [4, 4, 4, 4, 7, 7])
+    X = [[0, 0], [0, 1], [1, 0], [1, 1], [0, 0], [0, 1]]
+    rows = _rows(X, [1, 0, 0, 1, 0, 1], [4, 4, 4, 4, 7, 7])
     prefer_first = np.array([0.9, 0.1] * 3)
     assert selection_success(prefer_first, rows, slice(0, 1)).tolist() == [0.5, 0.0]
     assert selection_success(-prefer_first, rows, slice(0, 1)).tolist() == [0.5, 1.0]

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lic_drake.estimate.estimator import Predictor
+from lic_drake.estimate.estimator import SuccessEstimator
 from lic_drake.estimate.features import ExperienceRows
-from lic_drake.estimate.folds import environment_folds
+from lic_drake.estimate.rows import group_folds
 from lic_drake.types import Vector
 
 MIN_PROBABILITY = 1e-3
@@ -52,14 +52,14 @@ class HeldOutPredictions:
 
         Environments are what repeats independently, so that standard errors follow from these.
         """
-        gain = _log_losses(self.constant, self.rows.f) - _log_losses(self.probability, self.rows.f)
-        _, index = np.unique(self.rows.environment, return_inverse=True)
+        gain = _log_losses(self.constant, self.rows.y) - _log_losses(self.probability, self.rows.y)
+        _, index = np.unique(self.rows.groups, return_inverse=True)
         by_environment: Vector = np.bincount(index, gain) / np.bincount(index)
         return by_environment
 
 
 def hold_out_environments(
-    make: Callable[[], Predictor], rows: ExperienceRows, *, folds: int = 10
+    make: Callable[[], SuccessEstimator], rows: ExperienceRows, *, folds: int = 10
 ) -> HeldOutPredictions:
     """Predicts every reach from a fit on the environments of the other folds.
 
@@ -71,13 +71,13 @@ def hold_out_environments(
     Raises:
         EstimateError: Fewer than two environments or folds, or rows that cannot be fitted.
     """
-    fold = environment_folds(rows.environment, folds)
-    probability, constant = np.empty(len(rows.f)), np.empty(len(rows.f))
+    fold = group_folds(rows.groups, folds)
+    probability, constant = np.empty(len(rows.y)), np.empty(len(rows.y))
     for held_out in range(fold.max() + 1):
         out = fold == held_out
-        estimator = make().fit(rows.Z[~out], rows.f[~out], rows.environment[~out])
-        probability[out] = estimator.predict(rows.Z[out]).probability
-        constant[out] = rows.f[~out].mean()
+        estimator = make().fit(rows.X[~out], rows.y[~out], rows.groups[~out])
+        probability[out] = estimator.predict_proba(rows.X[out])[:, 1]
+        constant[out] = rows.y[~out].mean()
     return HeldOutPredictions(rows=rows, probability=probability, constant=constant)
 
 
@@ -107,10 +107,10 @@ def score(held_out: HeldOutPredictions, situation: slice) -> Scores:
     gain = held_out.gain_by_environment()
     selected = selection_success(held_out.probability, held_out.rows, situation)
     return Scores(
-        log_loss=log_loss(held_out.probability, held_out.rows.f),
+        log_loss=log_loss(held_out.probability, held_out.rows.y),
         gain=float(gain.mean()),
         gain_error=_standard_error(gain),
-        brier=brier_score(held_out.probability, held_out.rows.f),
+        brier=brier_score(held_out.probability, held_out.rows.y),
         selected=float(selected.mean()),
         selected_error=_standard_error(selected),
     )
@@ -164,12 +164,12 @@ def selection_success(score: Vector, rows: ExperienceRows, situation: slice) -> 
     Returns:
         One share per environment, in rising order of its number.
     """
-    given = np.column_stack([rows.environment, rows.Z[:, situation]])
+    given = np.column_stack([rows.groups, rows.X[:, situation]])
     choices, choice = np.unique(given, axis=0, return_inverse=True)
     best = np.full(len(choices), -np.inf)
     np.maximum.at(best, choice, score)
     chosen = score == best[choice]
-    success = np.bincount(choice[chosen], rows.f[chosen]) / np.bincount(choice[chosen])
+    success = np.bincount(choice[chosen], rows.y[chosen]) / np.bincount(choice[chosen])
     _, environment = np.unique(choices[:, 0], return_inverse=True)
     share: Vector = np.bincount(environment, success) / np.bincount(environment)
     return share
