@@ -1,26 +1,10 @@
 """Parameters of the quasi-static MPC, with the published sets of values."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from lic_drake.errors import ScenarioError
-
-# Without a weight on torque changes the controller's program would have no unique solution.
-_POSITIVE = (
-    "force_threshold_N",
-    "contact_stiffness_N_per_m",
-    "tip_step_m",
-    "torque_change_weight",
-)
-_FINITE = (
-    "force_trim_N",
-    "slow_distance_m",
-    "position_weight",
-    "force_weight",
-    "force_decrease_N",
-    "deadzone_m",
-)
+from lic_drake.config import check_numbers
 
 
 @dataclass(kw_only=True)
@@ -65,19 +49,29 @@ class MpcConfig:
     # A joint beyond its limit only must not go further (else: must come back in one step).
     forgive_joint_limits: bool = True
     # The tip is not moved any further where it is nearer to the goal than this, m.
-    deadzone_m: float = field(default=0.0, metadata={"since": 3})
+    deadzone_m: float = 0.0
 
     def __post_init__(self) -> None:
-        if not 1.0 <= self.rate_hz <= 1000.0:
-            raise ScenarioError(f"mpc rate_hz must be from 1 to 1000, got {self.rate_hz}")
-        for name, value in vars(self).items():
-            if name in _POSITIVE and not (np.isfinite(value) and value > 0.0):
-                raise ScenarioError(f"mpc {name} must be a positive number, got {value}")
-            if name in _FINITE and not (np.isfinite(value) and value >= 0.0):
-                raise ScenarioError(f"mpc {name} must be zero or a positive number, got {value}")
-            # A negative rise is a wanted fall.
-            if not value >= 0.0 and (np.isnan(value) or not name.startswith("rise")):
-                raise ScenarioError(f"mpc {name} must be zero or more, got {value}")
+        # Limits may be infinite, and a negative rise is a wanted fall.
+        limits = ("fall_below_N", "fall_over_N", "max_change_deg", "max_windup_deg")
+        ranges = {
+            "rate_hz": (1.0, 1000.0),
+            **dict.fromkeys((*limits, "reset_windup_deg"), (0.0, np.inf)),
+            **dict.fromkeys(("rise_below_N", "rise_over_N"), (-np.inf, np.inf)),
+        }
+        check_numbers(
+            self,
+            # Without a weight on torque changes the program would have no unique solution.
+            positive=(
+                *("force_threshold_N", "contact_stiffness_N_per_m", "tip_step_m"),
+                "torque_change_weight",
+            ),
+            non_negative=(
+                *("force_trim_N", "slow_distance_m", "position_weight", "force_weight"),
+                *("force_decrease_N", "deadzone_m"),
+            ),
+            ranges=ranges,
+        )
 
     @property
     def period_s(self) -> float:

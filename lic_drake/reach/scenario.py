@@ -26,6 +26,12 @@ from lic_drake.scene.scene import SceneConfig
 from lic_drake.seeds import make_generator
 from lic_drake.types import Vector
 
+_LATER_FIELDS = frozenset(
+    "random_goals base torso_m stand progress_m progress_time_s deadzone_m drag_N_s_per_m"
+    " taxels_per_m".split()
+)
+"""Fields that digests leave out at their defaults: the first libraries are older than they are."""
+
 
 @dataclass(kw_only=True)
 class Scenario:
@@ -100,15 +106,11 @@ def to_dict(scenario: Scenario) -> dict[str, Any]:
 
 
 def _identity(part: Any) -> dict[str, Any]:
-    """Returns the values that make a scenario what it is.
-
-    Fields that came later (`since`) are left out where they have their default: the scenario is
-    then the same as before there was such a field.
-    """
+    """Returns the values that make a scenario what it is; see `_LATER_FIELDS`."""
     values = {}
     for item in dataclasses.fields(part):
         value = getattr(part, item.name)
-        if "since" not in item.metadata or value != item.default:
+        if item.name not in _LATER_FIELDS or value != item.default:
             values[item.name] = _identity(value) if dataclasses.is_dataclass(value) else value
     return values
 
@@ -125,12 +127,10 @@ def load_scenario(name_or_path: str | Path, overrides: str = "") -> Scenario:
     """
     path = Path(name_or_path)
     if path.suffix not in (".yaml", ".yml"):
-        # A name is no way out of the folder.
+        # Reject path traversal in scenario names.
         path = scenarios_dir() / f"{path.name}.yaml" if path.name == str(name_or_path) else Path()
     try:
-        content = path.read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise ScenarioError(f"{path} is not a text file; a scenario is YAML in UTF-8") from None
+        content = path.read_bytes()
     except (OSError, ValueError):  # A name with a null byte is a ValueError.
         known = ", ".join(sorted(p.stem for p in scenarios_dir().glob("*.yaml")))
         raise ScenarioError(
@@ -139,7 +139,7 @@ def load_scenario(name_or_path: str | Path, overrides: str = "") -> Scenario:
     return parse_scenario(content, overrides, source=str(name_or_path))
 
 
-def parse_scenario(content: str, overrides: str = "", source: str = "scenario") -> Scenario:
+def parse_scenario(content: str | bytes, overrides: str = "", source: str = "scenario") -> Scenario:
     """Builds a scenario from YAML text; see `load_scenario`."""
     data = merge(read_mapping(content, source), read_mapping(overrides, "overrides"))
     sections = {"category", "robot", "clutter", "task", "scene", "mpc", "stop"}

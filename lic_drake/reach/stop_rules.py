@@ -2,15 +2,15 @@
 
 import math
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass, fields
 
 import numpy as np
 
-from lic_drake.errors import ScenarioError
+from lic_drake.config import check_numbers
 from lic_drake.types import Vector
 
 MAX_TIMEOUT_S = 3600.0
-"""Longer reaches are refused: simulating one would take minutes."""
+"""Maximum simulated time of a reach; a longer one would take minutes to simulate."""
 
 
 @dataclass(kw_only=True)
@@ -24,8 +24,8 @@ class StopConfig:
     stuck_time_s: float = 3.0
     # Where objects give way slowly: a reach is also stuck when its smallest distance to the goal
     # fell by less than `progress_m` in `progress_time_s`; 0: this does not count.
-    progress_m: float = field(default=0.0, metadata={"since": 3})
-    progress_time_s: float = field(default=3.0, metadata={"since": 3})
+    progress_m: float = 0.0
+    progress_time_s: float = 3.0
     # Simulated seconds after which a reach fails.
     timeout_s: float = 30.0
     # A reach fails when a taxel reads more than `force_limit_N` for `force_time_s` on end. The
@@ -35,15 +35,10 @@ class StopConfig:
     force_time_s: float = 0.1
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if name == "progress_m" and not 0.0 <= value < math.inf:
-                raise ScenarioError(f"stop rule progress_m must be 0 or more, got {value}")
-            if name != "progress_m" and not value > 0.0:
-                raise ScenarioError(f"stop rule {name} must be positive, got {value}")
-        if self.timeout_s > MAX_TIMEOUT_S:
-            raise ScenarioError(
-                f"stop rule timeout_s must be at most {MAX_TIMEOUT_S:g}, got {self.timeout_s}"
-            )
+        # An infinite limit switches a rule off.
+        ranges = {item.name: (0.0, math.inf) for item in fields(self)}
+        ranges["timeout_s"] = (0.0, MAX_TIMEOUT_S)
+        check_numbers(self, positive=["success_distance_m"], ranges=ranges)
 
 
 class StopMonitor:

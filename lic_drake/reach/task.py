@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from lic_drake.config import check_numbers
 from lic_drake.errors import ScenarioError
 from lic_drake.robots.arm import Arm
 from lic_drake.types import Vector
@@ -33,8 +34,7 @@ class StartLine:
     phi_step_deg: float = 30.0
 
     def __post_init__(self) -> None:
-        if not np.isfinite(self.x_m):
-            raise ScenarioError(f"start line x_m must be a finite number, got {self.x_m}")
+        check_numbers(self, finite=["x_m"])
         _check_range("start line y_m", self.y_min_m, self.y_max_m, self.y_step_m)
         _check_range("start line phi_deg", self.phi_min_deg, self.phi_max_deg, self.phi_step_deg)
 
@@ -68,7 +68,7 @@ class GoalArea:
     upper: list[float] = field(default_factory=lambda: [0.85, 0.4])
     step_m: float = 0.1
     # A collection tries this many random goals in each environment; 0: the grid.
-    random_goals: int = field(default=0, metadata={"since": 2})
+    random_goals: int = 0
 
     def __post_init__(self) -> None:
         if len(self.lower) != len(self.upper) or len(self.lower) not in (2, 3):
@@ -78,8 +78,7 @@ class GoalArea:
             )
         for name, low, high in zip("xyz", self.lower, self.upper, strict=False):
             _check_range(f"goal area {name}", low, high, self.step_m)
-        if self.random_goals < 0:
-            raise ScenarioError(f"random_goals must be 0 or more, got {self.random_goals}")
+        check_numbers(self, non_negative=["random_goals"])
 
     def grid(self) -> Vector:
         """Returns the grid goals, shape (n, 3), metres; x varies slowest."""
@@ -111,10 +110,7 @@ class BaseTrack:
 
     def __post_init__(self) -> None:
         _check_range("base track y_m", self.y_min_m, self.y_max_m, 0.1)
-        if self.starts_per_aperture < 1:
-            raise ScenarioError(
-                f"starts_per_aperture must be 1 or more, got {self.starts_per_aperture}"
-            )
+        check_numbers(self, positive=["starts_per_aperture"])
 
 
 @dataclass(kw_only=True)
@@ -160,11 +156,11 @@ class Task:
 
     start_line: StartLine = field(default_factory=StartLine)
     # None: the base is fixed at the origin.
-    base: BaseTrack | None = field(default=None, metadata={"since": 2})
+    base: BaseTrack | None = None
     # Height of the robot's torso lift, metres; 0 for a robot without one.
-    torso_m: float = field(default=0.0, metadata={"since": 3})
+    torso_m: float = 0.0
     # None: base and torso stay where they are.
-    stand: Stand | None = field(default=None, metadata={"since": 3})
+    stand: Stand | None = None
     # None: the goal is the one that each environment offers (passage-clutter).
     goal_area: GoalArea | None = field(default_factory=GoalArea)
 

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-import numpy as np
 from pydrake.geometry import (
     AddCompliantHydroelasticProperties,
     AddContactMaterial,
@@ -11,10 +10,10 @@ from pydrake.geometry import (
 )
 from pydrake.multibody.plant import CoulombFriction
 
-from lic_drake.errors import ScenarioError
+from lic_drake.config import check_numbers
 
-MIN_MESH_M = 1e-4
-"""A finer mesh than this is refused: it would not fit into memory."""
+MESH_RANGE_M = (1e-4, 10.0)
+"""Finest and coarsest contact mesh; a finer one would not fit into memory."""
 
 _SKIN_FRICTION = 1e6
 # Drake combines two coefficients to 2 a b / (a + b), which is at most 2 b. A skin with a very
@@ -41,17 +40,12 @@ class ContactConfig:
     object_mesh_m: float = 0.004
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not (np.isfinite(value) and value >= 0.0):
-                raise ScenarioError(f"contact {name} must be zero or positive, got {value}")
-        for name in ("skin_modulus_Pa", "object_stiffness_N_per_m"):
-            if getattr(self, name) == 0.0:
-                raise ScenarioError(f"contact {name} must be positive, got 0")
-        for name in ("skin_mesh_m", "object_mesh_m"):
-            if getattr(self, name) < MIN_MESH_M:
-                raise ScenarioError(
-                    f"contact {name} must be at least {MIN_MESH_M:g}, got {getattr(self, name)}"
-                )
+        check_numbers(
+            self,
+            positive=["skin_modulus_Pa", "object_stiffness_N_per_m"],
+            non_negative=["dissipation_s_per_m", "object_friction"],
+            ranges={"skin_mesh_m": MESH_RANGE_M, "object_mesh_m": MESH_RANGE_M},
+        )
 
 
 def skin_properties(config: ContactConfig) -> ProximityProperties:

@@ -27,6 +27,7 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
 from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.config import check_numbers
 from lic_drake.errors import ScenarioError
 from lic_drake.robots.arm import Arm
 from lic_drake.scene.contact import ContactConfig, object_properties, skin_properties
@@ -60,9 +61,9 @@ class SceneConfig:
     ground_friction_N: float = 2.0
     ground_creep_m_per_s: float = 1e-3
     # Viscous drag of a floating object, N s/m: 0.1 kg whose velocity halves every 1 ms.
-    drag_N_s_per_m: float = field(default=69.3, metadata={"since": 3})
+    drag_N_s_per_m: float = 69.3
     # Density of the skin's sensors, 1/m (paper V-A: 100 in the plane).
-    taxels_per_m: float = field(default=100.0, metadata={"since": 3})
+    taxels_per_m: float = 100.0
     contact: ContactConfig = field(default_factory=ContactConfig)
 
     def __post_init__(self) -> None:
@@ -77,17 +78,13 @@ class SceneConfig:
                 f"contact_approximation must be one of {', '.join(CONTACT_APPROXIMATIONS)},"
                 f" got {self.contact_approximation!r}"
             )
-        for name in (
-            "cenic_accuracy",
-            "cenic_max_step_s",
-            "ground_friction_N",
-            "ground_creep_m_per_s",
-            "drag_N_s_per_m",
-            "taxels_per_m",
-        ):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0.0):
-                raise ScenarioError(f"{name} must be a positive number, got {value}")
+        check_numbers(
+            self,
+            positive=(
+                *("cenic_accuracy", "cenic_max_step_s", "ground_friction_N"),
+                *("ground_creep_m_per_s", "drag_N_s_per_m", "taxels_per_m"),
+            ),
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

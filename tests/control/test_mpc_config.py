@@ -76,11 +76,16 @@ def test_the_controller_of_reference_1_has_its_published_values() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["rate_hz", "force_threshold_N", "contact_stiffness_N_per_m", "tip_step_m"]
+    ("name", "value", "said"),
+    [
+        ("rate_hz", 0.0, "from 1 to 1000"),
+        ("force_threshold_N", INF, "a positive number"),
+        ("deadzone_m", -0.01, "0 or a positive number"),
+        ("fall_below_N", float("nan"), "from 0 to inf"),
+    ],
 )
-@pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), INF])
-def test_a_value_that_cannot_be_used_is_named(name: str, value: float) -> None:
-    with pytest.raises(ScenarioError, match=rf"mpc {name} must be .*, got {value}"):
+def test_a_value_that_cannot_be_used_is_named(name: str, value: float, said: str) -> None:
+    with pytest.raises(ScenarioError, match=f"{name} must be {said}, got {value}"):
         MpcConfig(**{name: value})
 
 

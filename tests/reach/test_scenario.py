@@ -1,7 +1,6 @@
 import copy
 import dataclasses
 import math
-import pickle
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -9,13 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
 
 from lic_drake.control.mpc_config import ijrr_2013
-from lic_drake.errors import LicError, ScenarioError
+from lic_drake.errors import ScenarioError
 from lic_drake.paths import scenarios_dir, shipped_library
-from lic_drake.reach.scenario import Scenario, load_scenario, parse_scenario, to_dict
+from lic_drake.reach.scenario import load_scenario, parse_scenario, to_dict
 from lic_drake.reach.task import BaseTrack
 
 SHIPPED = sorted(path.stem for path in scenarios_dir().glob("*.yaml"))
@@ -92,49 +89,24 @@ def test_an_mpc_preset_fills_what_the_file_leaves_open() -> None:
         ("{stop: {timeout: 3}}", "stop: "),
         ("{scene: {contact: {stiffness: 3}}}", "scene: "),
         ("{stop: {timeout_s: soon}}", "stop: "),
-        ("{stop: {timeout_s: [3]}}", "stop: "),
         ("{stop: 3}", "stop must be a YAML mapping, got 3"),
-        ("{mpc: [1]}", "mpc must be a YAML mapping, got [1]"),
-        ("{stop: {1: 2}}", "stop: "),
-        ("{stop: {timeout_s: .nan}}", "stop: stop rule timeout_s must be positive, got nan"),
-        ("{stop: {timeout_s: -1}}", "stop: stop rule timeout_s must be positive, got -1.0"),
-        ("{stop: {timeout_s: .inf}}", "stop: stop rule timeout_s must be at most 3600, got inf"),
-        ("{stop: {force_limit_N: 0}}", "stop: stop rule force_limit_N must be positive, got 0.0"),
-        ("{stop: {progress_m: -1}}", "stop: stop rule progress_m must be 0 or more, got -1.0"),
-        ("{stop: {progress_time_s: 0}}", "stop: stop rule progress_time_s must be positive"),
-        ("{task: {stand: {y_max_m: -1}}}", "task: stand y_m: needs finite numbers"),
-        ("{task: {stand: {training_torso_m: [0.4]}}}", "task: stand training_torso_m must be"),
-        ("{task: {stand: {training_y_m: []}}}", "task: stand training_y_m must be numbers from 0"),
-        ("{task: {stand: {z_m: 1}}}", "task: "),
-        ("{scene: {time_step_s: -0.005}}", "scene: time_step_s must be from 1e-05 to 0.1, or 0"),
+        ("{stop: {timeout_s: .inf}}", "stop: timeout_s must be from 0 to 3600, got inf"),
+        ("{task: {stand: {y_min_m: 1}}}", "task: stand y_m: needs finite numbers"),
         ("{scene: {time_step_s: .nan}}", "scene: time_step_s must be from 1e-05 to 0.1, or 0"),
         ("{scene: {contact_approximation: tamsi}}", "must be one of sap, similar, lagged, got"),
-        ("{scene: {cenic_max_step_s: .nan}}", "cenic_max_step_s must be a positive number"),
-        ("{scene: {ground_friction_N: 0}}", "ground_friction_N must be a positive number"),
-        ("{scene: {contact: {skin_modulus_Pa: 0}}}", "contact skin_modulus_Pa must be positive"),
-        ("{scene: {contact: {skin_mesh_m: 1.0e-9}}}", "contact skin_mesh_m must be at least"),
-        ("{scene: {contact: {object_friction: -1}}}", "object_friction must be zero or positive"),
-        ("{mpc: {rate_hz: 0}}", "mpc rate_hz must be from 1 to 1000, got 0"),
-        ("{mpc: {force_weight: .nan}}", "mpc force_weight must be zero or a positive number"),
-        ("{mpc: {max_change_deg: -1}}", "mpc max_change_deg must be zero or more, got -1.0"),
-        ("{mpc: {torque_change_weight: 0}}", "torque_change_weight must be a positive number"),
-        ("{clutter: {num_movable: -1}}", "clutter: num_movable must be from 0 to"),
+        ("{scene: {ground_friction_N: 0}}", "scene: ground_friction_N must be a positive number"),
+        ("{scene: {contact: {skin_mesh_m: 0}}}", "skin_mesh_m must be from 0.0001 to 10, got 0.0"),
+        ("{mpc: {rate_hz: 0}}", "mpc: rate_hz must be from 1 to 1000, got 0"),
         ("{clutter: {num_movable: 2.5}}", "clutter: "),
-        ("{task: {start_line: {x_m: .nan}}}", "task: start line x_m must be a finite number"),
-        ("{task: {goal_area: {step_m: 0}}}", "task: goal area x: needs finite numbers"),
         ("{task: {goal_area: {step_m: 1.0e-9}}}", "more than 1000 steps of 1e-09"),
         ("{task: {goal_area: null}}", "task: goal_area cannot be null, because an environment of"),
-        ("{task: {goal_area: 3}}", "task: "),
         ("{category: jungle}", "unknown category 'jungle'; choose one of cylinder-clutter"),
         ("{category: [cylinder-clutter]}", "category must be a name, got ['cylinder-clutter']"),
         ("{robot: r2d2}", "unknown robot 'r2d2'; choose one of planar-arm"),
-        ("{robot: null}", "robot must be a name, got None"),
         ("{mpc: {preset: greedy}}", "unknown mpc preset 'greedy'; choose ['haptic_mpc_2013', "),
         ("{mpc: {preset: {a: 1}}}", "unknown mpc preset {'a': 1}"),
         ("[1, 2]", "overrides: must be a YAML mapping, found list"),
         ("stop: {", "overrides: not YAML: "),
-        ("stop: {timeout_s: 2020-13-45}", "overrides: not YAML: month must be in 1..12"),
-        ("stop: " + "[" * 3000, "overrides: not YAML: "),
     ],
 )
 def test_what_does_not_fit_is_refused_with_its_place_and_value(
@@ -143,88 +115,18 @@ def test_what_does_not_fit_is_refused_with_its_place_and_value(
     assert message in error_of(overrides)
 
 
-@pytest.mark.parametrize("name", ["jungle", "none.yaml", "a\x00b.yaml", "", "x" * 5000])
+@pytest.mark.parametrize(
+    "name", ["jungle", "none.yaml", "../scenarios/cylinder-clutter", "a\x00b.yaml", ""]
+)
 def test_a_missing_scenario_names_the_shipped_ones(name: str) -> None:
     with pytest.raises(ScenarioError) as caught:
         load_scenario(name)
     assert f"shipped scenarios: {', '.join(SHIPPED)}" in str(caught.value)
 
 
-def test_a_folder_or_a_binary_file_is_no_scenario(tmp_path: Path) -> None:
-    folder, binary = tmp_path / "folder.yaml", tmp_path / "binary.yaml"
-    folder.mkdir()
-    binary.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(ScenarioError, match="no scenario"):
-        load_scenario(folder)
-    with pytest.raises(ScenarioError, match="is not a text file"):
-        load_scenario(binary)
-
-
 def test_category_and_robot_are_needed() -> None:
     with pytest.raises(ScenarioError, match="needs the keys 'category' and 'robot'"):
         parse_scenario("stop: {timeout_s: 3}")
-
-
-def check(content: str) -> None:
-    """Parses; whatever the content, the result is a usable scenario or a one-line ScenarioError."""
-    try:
-        scenario = parse_scenario(content)
-    except ScenarioError as error:
-        assert "\n" not in str(error)
-    else:
-        assert len(scenario.digest) == 12
-        scenario.task.goal_area.grid()
-
-
-SCALARS = (
-    st.none()
-    | st.booleans()
-    | st.integers()
-    | st.floats()
-    | st.sampled_from(["", "1.5", "lagged", "2020-13-45", "!!int x"])
-    | st.text(max_size=8)
-)
-VALUES = st.recursive(
-    SCALARS,
-    lambda inner: (
-        st.lists(inner, max_size=3)
-        | st.dictionaries(st.text(max_size=5) | st.integers() | st.none(), inner, max_size=3)
-    ),
-    max_leaves=5,
-)
-
-
-def paths(content: dict[str, Any]) -> Iterator[tuple[str, ...]]:
-    for key, value in content.items():
-        yield (key,)
-        if isinstance(value, dict):
-            yield from ((key, *path) for path in paths(value))
-
-
-FULL = to_dict(load_scenario("cylinder-clutter"))
-PATHS = sorted(paths(FULL))
-
-
-@settings(max_examples=150)
-@given(st.lists(st.tuples(st.sampled_from(PATHS), VALUES), min_size=1, max_size=2))
-@example([(("clutter", "upper"), [math.inf, 1e308])])
-@example([(("task", "start_line", "y_step_m"), 5e-324)])
-def test_random_values_never_raise_anything_else(
-    mutations: list[tuple[tuple[str, ...], Any]],
-) -> None:
-    content = copy.deepcopy(FULL)
-    for (*parents, key), value in mutations:
-        section = content
-        for parent in parents:
-            section = section.get(parent) if isinstance(section, dict) else None
-        if isinstance(section, dict):
-            section[key] = value
-    check(yaml.safe_dump(content, allow_unicode=True))
-
-
-@given(st.text() | st.text("{}[]:,-&*?!|>'\"%@ \nab1.", max_size=40))
-def test_random_text_never_raises_anything_else(content: str) -> None:
-    check(content)
 
 
 def leaves(section: Any) -> Iterator[tuple[Any, str]]:
@@ -296,9 +198,6 @@ def test_a_base_that_moves_needs_apertures() -> None:
         load_scenario("cylinder-clutter", "{task: {base: {y_min_m: -0.1}}}")
     scenario = load_scenario("cylinder-aperture-clutter")
     assert scenario.task.base is not None
-    for values in ("{y_min_m: 1.0, y_max_m: 0.0}", "{starts_per_aperture: 0}", "{y_max_m: .nan}"):
-        with pytest.raises(ScenarioError, match="task: "):
-            load_scenario("cylinder-aperture-clutter", f"{{task: {{base: {values}}}}}")
 
 
 def test_random_goals_are_functions_of_the_environment_in_the_area() -> None:
@@ -313,8 +212,6 @@ def test_random_goals_are_functions_of_the_environment_in_the_area() -> None:
     assert np.all(goals[:, :2] >= area.lower) and np.all(goals[:, :2] <= area.upper)
     everything = np.vstack([goals, scenario.goals("training", 4), scenario.goals("holdout", 3)])
     assert len(np.unique(everything, axis=0)) == 12
-    with pytest.raises(ScenarioError, match="random_goals must be 0 or more, got -1"):
-        load_scenario("cylinder-clutter", "{task: {goal_area: {random_goals: -1}}}")
 
 
 def test_the_digest_ignores_comments_order_and_how_numbers_are_written() -> None:
@@ -328,14 +225,6 @@ def test_the_digest_ignores_comments_order_and_how_numbers_are_written() -> None
     assert integers != without_comments
     for text in (backwards, without_comments, integers):
         assert parse_scenario(text).digest == plain.digest
-
-
-@pytest.mark.parametrize("name", SHIPPED)
-def test_a_scenario_survives_pickling(name: str) -> None:
-    scenario = load_scenario(name)
-    copied: Scenario = pickle.loads(pickle.dumps(scenario))
-    assert copied == scenario
-    assert copied.digest == scenario.digest
 
 
 def test_environments_and_goals_are_functions_of_their_index() -> None:
@@ -358,11 +247,3 @@ def test_environments_and_goals_are_functions_of_their_index() -> None:
     )
     assert len(np.unique(goals, axis=0)) == 8
     np.testing.assert_array_equal(goals[5], twin.sample_goal("evaluation", 0, 1))
-
-
-def test_unknown_streams_and_negative_environments_are_refused() -> None:
-    scenario = load_scenario("cylinder-clutter")
-    with pytest.raises(LicError, match="unknown seed stream 'test'"):
-        scenario.sample_instance("test", 0)
-    with pytest.raises(LicError, match="from 0 to 2\\^32 - 1"):
-        scenario.sample_instance("training", -1)

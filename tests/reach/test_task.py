@@ -1,3 +1,5 @@
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -5,7 +7,7 @@ from hypothesis import strategies as st
 
 from lic_drake.errors import ScenarioError
 from lic_drake.reach.scenario import load_scenario
-from lic_drake.reach.task import GoalArea, Stand, StartLine
+from lic_drake.reach.task import BaseTrack, GoalArea, Stand, StartLine
 from lic_drake.robots.planar import planar_arm
 from lic_drake.robots.pr2 import TORSO_RANGE_M
 
@@ -77,62 +79,30 @@ def test_sampled_goals_fill_the_area_evenly() -> None:
 
 
 @pytest.mark.parametrize(
-    "values",
+    ("kind", "values", "message"),
     [
-        {"y_min_m": 0.5},
-        {"y_step_m": 0.0},
-        {"phi_step_deg": -30.0},
-        {"phi_max_deg": np.nan},
-        {"y_max_m": np.inf},
-        {"x_m": np.inf},
-        {"y_step_m": 1e-6},
+        (StartLine, {"y_min_m": 0.5}, "start line y_m: needs finite numbers with min <= max"),
+        (StartLine, {"phi_max_deg": np.nan}, "start line phi_deg: needs finite numbers"),
+        (StartLine, {"x_m": np.inf}, "x_m must be a finite number, got inf"),
+        (StartLine, {"y_step_m": 1e-6}, "more than 1000 steps"),
+        (GoalArea, {"lower": [0.9, -0.4]}, "goal area x: needs finite numbers with min <= max"),
+        (GoalArea, {"upper": [0.8]}, r"goal area corners must be \[x, y\]"),
+        (GoalArea, {"random_goals": -1}, "random_goals must be 0 or a positive number, got -1"),
+        (BaseTrack, {"starts_per_aperture": 0}, "starts_per_aperture must be a positive number"),
+        (Stand, {"torso_max_m": np.nan}, "stand torso_m: needs finite numbers"),
+        (Stand, {"training_y_m": []}, r"training_y_m must be .* from 0.0 to 0.0, .* got \[\]"),
+        (Stand, {"training_torso_m": [0.1]}, r"training_torso_m must be .* got \[0.1\]"),
     ],
 )
-def test_impossible_start_lines_are_refused(values: dict[str, float]) -> None:
-    with pytest.raises(ScenarioError, match="start line"):
-        StartLine(**values)
-
-
-@pytest.mark.parametrize(
-    "values",
-    [
-        {"lower": [0.9, -0.4]},
-        {"lower": [0.4, np.nan]},
-        {"upper": [0.8]},
-        {"lower": [0.4, -0.4, 0.0]},
-        {"step_m": 0.0},
-        {"step_m": np.nan},
-        {"step_m": 1e-6},
-    ],
-)
-def test_impossible_goal_areas_are_refused(values: dict[str, float]) -> None:
-    with pytest.raises(ScenarioError, match="goal area"):
-        GoalArea(**values)
+def test_impossible_values_are_refused(kind: type, values: dict[str, Any], message: str) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        kind(**values)
 
 
 def test_an_area_without_extent_is_a_single_goal() -> None:
     area = GoalArea(lower=[0.6, 0.1], upper=[0.6, 0.1])
     np.testing.assert_array_equal(area.grid(), [[0.6, 0.1, 0.0]])
     np.testing.assert_array_equal(area.sample(np.random.default_rng(0)), [0.6, 0.1, 0.0])
-
-
-@pytest.mark.parametrize(
-    ("values", "message"),
-    [
-        ({"y_min_m": 0.1}, r"stand y_m: needs .* got 0.1..0.0"),
-        ({"y_max_m": np.inf}, "stand y_m: needs finite numbers"),
-        ({"torso_min_m": 0.2}, r"stand torso_m: needs .* got 0.2..0.15"),
-        ({"torso_max_m": np.nan}, "stand torso_m: needs finite numbers"),
-        ({"training_y_m": []}, r"training_y_m must be .* from 0.0 to 0.0, one at least, got \[\]"),
-        ({"training_y_m": [0.0, 0.2]}, r"training_y_m must be .* got \[0.0, 0.2\]"),
-        ({"training_y_m": [np.nan]}, "training_y_m must be numbers from 0.0 to 0.0"),
-        ({"training_torso_m": []}, "training_torso_m must be numbers from 0.15 to 0.15"),
-        ({"training_torso_m": [0.1]}, r"training_torso_m must be .* got \[0.1\]"),
-    ],
-)
-def test_impossible_stands_are_refused(values: dict[str, object], message: str) -> None:
-    with pytest.raises(ScenarioError, match=message):
-        Stand(**values)
 
 
 @given(st.integers(1, 5), st.integers(1, 4), st.integers(0, 200))

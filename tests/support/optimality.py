@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.optimize import linprog, lsq_linear
 
-from lic_drake.control.quadratic_program import QuadraticProgram
+from lic_drake.control.mpc import QuadraticProgram
 
 
 def violation(problem: QuadraticProgram, x: np.ndarray) -> float:
