@@ -4,6 +4,7 @@ import dataclasses
 import math
 import sys
 from collections.abc import Collection, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import yaml
@@ -22,8 +23,8 @@ def check_numbers(
     finite: Collection[str] = (),
     positive: Collection[str] = (),
     non_negative: Collection[str] = (),
-    ranges: Mapping[str, tuple[float, float]] | None = None,
-    vectors: Mapping[str, int] | None = None,
+    ranges: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+    vectors: Mapping[str, int] = MappingProxyType({}),
     intervals: Collection[str] = (),
     ascending: Collection[tuple[str, str]] = (),
     error: type[LicError] = ScenarioError,
@@ -44,16 +45,13 @@ def check_numbers(
     Raises:
         LicError: A field does not fit; the message names it, its value and the limit.
     """
-    limits: dict[str, tuple[float, float, str]] = {
-        **{name: (-_MAX, _MAX, "a finite number") for name in finite},
-        **{name: (math.ulp(0.0), _MAX, "a positive number") for name in positive},
-        **{name: (0.0, _MAX, "0 or a positive number") for name in non_negative},
-        **{
-            name: (low, high, f"from {low:g} to {high:g}")
-            for name, (low, high) in (ranges or {}).items()
-        },
-    }
-    for name, length in (vectors or {}).items():
+    limits: list[tuple[str, float, float, str]] = [
+        *((name, -_MAX, _MAX, "a finite number") for name in finite),
+        *((name, math.ulp(0.0), _MAX, "a positive number") for name in positive),
+        *((name, 0.0, _MAX, "0 or a positive number") for name in non_negative),
+        *((name, *ends, f"from {ends[0]:g} to {ends[1]:g}") for name, ends in ranges.items()),
+    ]
+    for name, length in vectors.items():
         value = getattr(config, name)
         if len(value) != length or not all(map(math.isfinite, value)):
             raise error(f"{name} must be {length} finite numbers, got {value}")
@@ -61,7 +59,7 @@ def check_numbers(
         value = getattr(config, name)
         if len(value) != 2 or not value[0] <= value[1]:
             raise error(f"{name} must be [least, most], got {value}")
-    for name, (low, high, wanted) in limits.items():
+    for name, low, high, wanted in limits:
         value = getattr(config, name)
         values = value if isinstance(value, list | tuple) else [value]
         if not all(low <= number <= high for number in values):
