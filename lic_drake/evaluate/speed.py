@@ -1,20 +1,43 @@
-"""Measures where the time of a reach goes."""
+"""Measures how fast reaches are simulated, and where the time goes."""
 
+import cProfile
+import pstats
 import time
+from collections import defaultdict
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from statistics import median
-from typing import Any, ClassVar
+from typing import Any
 
-from pydrake.systems.analysis import Simulator
-
-from lic_drake.control.mpc_controller import HapticMpcController
-from lic_drake.control.tactile_sensor import TactileSensor
+import lic_drake
 from lic_drake.evaluate.batch import random_requests
-from lic_drake.reach.environment import Environment
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario
-from lic_drake.reach.stem_waking import StemWakingSimulation
-from lic_drake.reach.waking import WakingSimulation
+
+PARTS = {
+    "control/tactile": "sensor",
+    "control/surface_taxels": "sensor",
+    "control/taxels": "sensor",
+    "control/": "mpc",
+    "scene/": "build",
+    "reach/diagram": "build",
+    "reach/simulation": "build",
+    "reach/sleeping": "build",
+    "reach/stem_waking": "build",
+    "reach/waking": "build",
+    "reach/": "rest",
+}
+"""Part of the time by the start of a module's path in the package; the first that fits counts."""
+
+STEP = "advance_to"
+"""Name of the method of `lic_drake.reach` that calls Drake's `Simulator.AdvanceTo`: to a profile,
+Drake's own time is that of the Python function that calls it."""
+
+_PACKAGE = Path(lic_drake.__file__).parent.as_posix() + "/"
+_ROUNDS = 10  # Calls between a module of the package and the function that takes the time.
+
+_Function = tuple[str, int, str]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,9 +51,10 @@ class ReachSpeed:
         simulated_s: Simulated time of all of them, seconds.
         wall_per_reach_s: Wall time of a reach, seconds.
         wall_per_sim_s: Wall seconds per simulated second.
-        split: Shares of the wall time of all reaches: physics (Drake's steps, and the contacts at
-            the control instants), sensor (taxels from contacts), mpc (controller without the
-            sensor), build (diagrams and their contexts), rest (stop rules, waking, records).
+        split: Shares of the time of one more environment's reaches under Python's profiler, which
+            makes Python's part look larger than it is: physics (Drake's time steps), sensor
+            (contacts and taxels), mpc, build (models, diagrams, contexts, waking objects), rest
+            (stop rules, records).
     """
 
     robot: str
@@ -46,41 +70,6 @@ class ReachSpeed:
         return asdict(self)
 
 
-class Stopwatch:
-    """Adds up the time spent in a method, by wrapping it for the length of a with block.
-
-    Time in another watched method that it calls is that one's.
-    """
-
-    _running: ClassVar[list["Stopwatch"]] = []
-
-    def __init__(self, owner: type, name: str) -> None:
-        self.seconds = 0.0
-        self._owner, self._name = owner, name
-        self._method = getattr(owner, name)
-
-    def __enter__(self) -> "Stopwatch":
-        method = self._method
-
-        def timed(*args: Any, **kwargs: Any) -> Any:
-            self._running.append(self)
-            began = time.perf_counter()
-            try:
-                return method(*args, **kwargs)
-            finally:
-                elapsed = time.perf_counter() - began
-                self._running.pop()
-                self.seconds += elapsed
-                if self._running:
-                    self._running[-1].seconds -= elapsed
-
-        setattr(self._owner, self._name, timed)
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        setattr(self._owner, self._name, self._method)
-
-
 def measure_reaches(scenario: Scenario, reaches: int, per_environment: int = 5) -> ReachSpeed:
     """Times reaches from random starts to random goals in one process.
 
@@ -93,28 +82,14 @@ def measure_reaches(scenario: Scenario, reaches: int, per_environment: int = 5) 
         per_environment: How many of them share an environment.
     """
     environments = -(-reaches // per_environment)
-    requests = random_requests(scenario, "calibration", environments, per_environment)[:reaches]
-    # Diagrams bind the methods when they are built, so the watches go on before the first one.
-    with (
-        Stopwatch(TactileSensor, "_calc_taxel_force") as sensor,
-        Stopwatch(TactileSensor, "_eval_contacts") as contacts,
-        Stopwatch(HapticMpcController, "_update") as controller,
-        Stopwatch(Simulator, "AdvanceTo") as stepping,
-        Stopwatch(WakingSimulation, "_with_spares") as build,
-        Stopwatch(StemWakingSimulation, "_with_awake") as build_stems,
-        Stopwatch(Environment, "_all_awake") as build_awake,
-    ):
-        began = time.perf_counter()
-        records = [run_reach(request) for request in requests]
-        total = time.perf_counter() - began
+    requests = random_requests(scenario, "calibration", environments + 1, per_environment)
+    records = [run_reach(request) for request in requests[:reaches]]
+    profile = cProfile.Profile(time.process_time)
+    profile.enable()
+    for request in requests[-per_environment:]:
+        run_reach(request)
+    profile.disable()
     moving = [record for record in records if record.duration_s > 0.0]
-    seconds = {
-        "physics": stepping.seconds + contacts.seconds,
-        "sensor": sensor.seconds,
-        "mpc": controller.seconds,
-        "build": build.seconds + build_stems.seconds + build_awake.seconds,
-    }
-    seconds["rest"] = total - sum(seconds.values())
     return ReachSpeed(
         robot=scenario.robot,
         category=scenario.category,
@@ -122,5 +97,44 @@ def measure_reaches(scenario: Scenario, reaches: int, per_environment: int = 5) 
         simulated_s=sum(record.duration_s for record in moving),
         wall_per_reach_s=median(record.wall_time_s for record in moving),
         wall_per_sim_s=median(record.wall_time_s / record.duration_s for record in moving),
-        split={name: value / total for name, value in seconds.items()},
+        split=split_time(pstats.Stats(profile)),
     )
+
+
+def split_time(stats: pstats.Stats) -> dict[str, float]:
+    """Returns the share of each part in a profile; shares add up to 1.
+
+    The time of any other function, of NumPy's or of a robot's kinematics for instance, is that of
+    the parts that call it, in proportion.
+    """
+    functions: Mapping[_Function, Any] = stats.stats  # type: ignore[attr-defined]
+    shares: dict[_Function, dict[str, float]] = {f: {_part(f): 1.0} for f in functions if _part(f)}
+    other = {f: callers for f, (*_, callers) in functions.items() if f not in shares}
+    for _ in range(_ROUNDS):
+        for function, callers in other.items():
+            total = sum(called[3] for called in callers.values())
+            mixed: dict[str, float] = defaultdict(float)
+            for caller, called in callers.items():
+                for part, share in shares.get(caller, {}).items():
+                    mixed[part] += share * called[3] / total if total else 0.0
+            shares[function] = mixed
+    seconds = dict.fromkeys(("physics", "sensor", "mpc", "build", "rest"), 0.0)
+    for function, (_, _, own, _, _) in functions.items():
+        of = shares[function]
+        for part, share in of.items():
+            seconds[part] += share * own
+        seconds["rest"] += (1.0 - sum(of.values())) * own
+    whole = sum(seconds.values())
+    return {name: value / whole for name, value in seconds.items()}
+
+
+def _part(function: _Function) -> str:
+    """Returns the part that a function belongs to by itself, or ""."""
+    file, _, name = function
+    path = Path(file).as_posix()
+    if not path.startswith(_PACKAGE):
+        return ""
+    module = path.removeprefix(_PACKAGE)
+    if name == STEP and module.startswith("reach/"):
+        return "physics"
+    return next((part for start, part in PARTS.items() if module.startswith(start)), "")

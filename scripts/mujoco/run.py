@@ -7,10 +7,8 @@ comes with the extra `bench`. On a quiet machine:
     python scripts/mujoco/run.py
 """
 
-import argparse
 import json
 import platform
-import sys
 import time
 from dataclasses import asdict
 from importlib.metadata import version
@@ -19,6 +17,7 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from lic_drake.reach.scenario import load_scenario
+from scripts.common import RESULTS, make_parser, run_script, write_report
 from scripts.mujoco.engines import Engine
 from scripts.mujoco.growth import cylinders_table, draw_requests, taxels_table, workers_table
 from scripts.mujoco.mujoco_scene import MujocoConfig
@@ -68,8 +67,8 @@ def make_engines(step_ms: float) -> tuple[list[Engine], list[tuple[str, str]]]:
     return engines + mujoco[2:], [(a.name, b.name) for a, b in pairs]
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def main() -> None:
+    parser = make_parser(__doc__)
     parser.add_argument("--scenario", default="cylinder-clutter", help="name or YAML file")
     parser.add_argument("--reaches", type=int, default=30)
     parser.add_argument("--stream", default="calibration", help="seed stream of the environments")
@@ -81,7 +80,7 @@ def main() -> int:
     parser.add_argument("--cylinders", type=int, nargs="+", default=[0, 20, 40, 80, 160, 320])
     parser.add_argument("--taxels", type=int, nargs="+", default=[50, 100, 200, 400], help="per m")
     parser.add_argument("--workers", type=int, nargs="+", default=[1, 2])
-    parser.add_argument("--out", type=Path, default=Path("notebooks/results/peers"))
+    parser.add_argument("--out", type=Path, default=RESULTS / "peers")
     args = parser.parse_args()
 
     scenario = load_scenario(args.scenario)
@@ -117,12 +116,10 @@ def main() -> int:
     )
     text = about + "".join(f"\n## {title}\n\n{table}" for title, table in tables.items())
     args.out.mkdir(parents=True, exist_ok=True)
-    (args.out / "peers.md").write_text(text, encoding="utf-8")
     content = {"about": about, "scenario": scenario.digest, "reaches": [asdict(r) for r in rows]}
     (args.out / "peers.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-    print(text, end="")
-    return 0
+    write_report(args.out / "peers.md", text)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_script(main)

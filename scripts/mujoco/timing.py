@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from itertools import groupby
+from typing import Any, ClassVar
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
 
 from lic_drake.control.mpc_controller import HapticMpcController
 from lic_drake.control.tactile_sensor import TactileSensor
-from lic_drake.evaluate.speed import Stopwatch
 from lic_drake.reach.request import ReachRequest
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.trace import ReachResult
@@ -90,6 +90,40 @@ def time_paired(
                     rows.append(_make_row(engine, number, result, total_s, parts, setup_s))
             say(f"  {len(rows) // len(engines)}/{len(requests)} reaches, {len(engines)} engines")
     return rows
+
+
+class Stopwatch:
+    """Adds up the time spent in a method, by wrapping it for the length of a with block.
+
+    Time in another watched method that it calls is that one's. Diagrams bind methods when they are
+    built, so the watches go on before.
+    """
+
+    _running: ClassVar[list["Stopwatch"]] = []
+
+    def __init__(self, owner: type, name: str) -> None:
+        self.seconds = 0.0
+        self._owner, self._name = owner, name
+        self._method = getattr(owner, name)
+
+    def __enter__(self) -> "Stopwatch":
+        def timed(*args: Any, **kwargs: Any) -> Any:
+            self._running.append(self)
+            began = time.perf_counter()
+            try:
+                return self._method(*args, **kwargs)
+            finally:
+                elapsed = time.perf_counter() - began
+                self._running.pop()
+                self.seconds += elapsed
+                if self._running:
+                    self._running[-1].seconds -= elapsed
+
+        setattr(self._owner, self._name, timed)
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        setattr(self._owner, self._name, self._method)
 
 
 class _Watches:

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from support.worlds import ARM, World, box, cylinder, make_clutter, make_world
+from support.worlds import ARM, World, cylinder, make_clutter, make_world
 
 from lic_drake.clutter.instance import ClutterInstance
-from lic_drake.errors import ScenarioError
 from lic_drake.scene.scene import SceneConfig
 
 pytest.importorskip("mujoco")
@@ -53,16 +52,6 @@ def test_the_free_arm_follows_its_equilibrium_as_in_drake(time_step_s: float) ->
     np.testing.assert_allclose(mine.q, q_d, atol=1e-5)
 
 
-@pytest.mark.parametrize("joint", [0, 1, 2])
-def test_a_joint_stops_at_its_limit(joint: int) -> None:
-    q = np.deg2rad([-50.0, 70.0, 80.0])
-    q[joint] = ARM.q_max[joint] - 0.1
-    world = MujocoWorld(q, make_clutter())
-    world.data.ctrl[joint] = ARM.q_max[joint] + 0.2
-    world.advance(5.0)
-    assert world.q[joint] == pytest.approx(ARM.q_max[joint], abs=2e-3)
-
-
 @pytest.mark.parametrize("time_step_s", [0.001, 0.005])
 @pytest.mark.parametrize("sleep", [True, False])
 @pytest.mark.parametrize("angle_deg", [0.0, 45.0, 90.0])
@@ -80,14 +69,6 @@ def test_dry_friction_holds_below_its_limit_and_yields_above(
         along = np.abs(force * direction)
         expected = 0.5 * np.linalg.norm(np.maximum(along - AXIS_LIMIT, 0.0))
         assert speed == pytest.approx(expected, rel=0.02, abs=1.5e-3)
-
-
-def test_what_nobody_pushes_stays_where_it_is() -> None:
-    clutter = make_clutter(cylinder(0.6, 0.0, movable=True), cylinder(0.7, 0.3, movable=True))
-    world = MujocoWorld(BENT, clutter, sleep=False)
-    world.data.ctrl[:] = BENT + 0.05
-    world.advance(2.0)
-    np.testing.assert_array_equal(world.data.qpos[3:], 0.0)
 
 
 def press(world: World | MujocoWorld, first: np.ndarray, force: float) -> tuple[float, float]:
@@ -164,9 +145,3 @@ def test_the_arm_slides_on_an_object_with_a_friction_of_0_4() -> None:
     mujoco.mj_contactForce(world.model, world.data, 0, wrench)
     assert wrench[0] > 1.0
     assert np.linalg.norm(wrench[1:3]) == pytest.approx(0.4 * wrench[0], rel=0.01)
-
-
-def test_only_cylinders_are_taken() -> None:
-    clutter = make_clutter(box(0.6, 0.0, (0.1, 0.1, 0.1)))
-    with pytest.raises(ScenarioError, match="only cylinders can be compared"):
-        MujocoWorld(PARKED, clutter)

@@ -41,16 +41,6 @@ def test_without_clutter_a_reach_arrives_when_drakes_does(goal: tuple[float, flo
     assert max(mine.trace.peak_force) == 0.0
 
 
-def test_a_reach_can_be_repeated_in_the_same_simulation() -> None:
-    scenario = small_clutter(timeout_s=8.0)
-    simulation = start(scenario, environment=2)
-    goals = ((0.65, -0.1), (0.7, 0.2), (0.65, -0.1))
-    first, other, again = (reach(scenario, simulation, goal).trace for goal in goals)
-    assert max(first.peak_force) > 0.0 < max(other.peak_force)
-    np.testing.assert_array_equal(first.q, again.q)
-    assert first.peak_force == again.peak_force
-
-
 def test_sleeping_changes_next_to_nothing() -> None:
     scenario = small_clutter(timeout_s=8.0)
     asleep, awake = (
@@ -60,15 +50,6 @@ def test_sleeping_changes_next_to_nothing() -> None:
     assert asleep.outcome == awake.outcome == "reached"
     assert max(awake.trace.peak_force) > 0.0
     np.testing.assert_allclose(asleep.trace.q, awake.trace.q, atol=1e-4)
-
-
-def test_a_start_in_contact_is_invalid() -> None:
-    scenario = free_space()
-    R_RL, p_RL = ARM.link_poses(start_angles(scenario))
-    clutter = make_clutter(cylinder(*(p_RL[2] - 0.1 * R_RL[2, :, 1])[:2]))
-    simulation = MujocoSimulation(scenario, clutter, MujocoConfig())
-    result = simulate(simulation, scenario, start_angles(scenario), np.array([0.6, 0.1, 0.0]))
-    assert result.outcome == "invalid_start"
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
