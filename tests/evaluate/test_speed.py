@@ -4,7 +4,7 @@ import pstats
 import numpy as np
 import pytest
 
-from lic_drake.control.quadratic_program import QuadraticProgram, solve
+from lic_drake.control.mpc import QuadraticProgram, solve
 from lic_drake.evaluate.speed import measure_reaches, split_time
 from lic_drake.reach.scenario import load_scenario
 
