@@ -156,7 +156,7 @@ def parse_scenario(content: str | bytes, overrides: str = "", source: str = "sce
                 raise ScenarioError(f"{source}: {key} must be a name, got {value!r}")
         elif value is not None and not isinstance(value, dict):
             raise ScenarioError(f"{source}: {key} must be a YAML mapping, got {value!r}")
-    sampler = get_category(data["category"])
+    sampler = get_category(data["category"]).sampler
     get_robot(data["robot"])
     mpc = dict(data.get("mpc") or {})
     preset = mpc.pop("preset", "haptic_mpc_2013")
