@@ -2,7 +2,7 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from lic_drake.cli.arguments import (
     Subparsers,
@@ -10,9 +10,6 @@ from lic_drake.cli.arguments import (
     add_method_argument,
     non_negative_int,
 )
-
-if TYPE_CHECKING:
-    from lic_drake.show.pr2_meshes import LinkMesh
 
 
 class _Demonstration(NamedTuple):
@@ -85,8 +82,8 @@ def add_parser(subparsers: Subparsers) -> None:
         choices=("primitives", "drake_models"),
         default="primitives",
         help="what the PR2 looks like: the shapes of its own model, or the meshes of Drake's public"
-        " one, package://drake_models, if they are on this machine or come within a minute"
-        " (default: %(default)s)",
+        " one, package://drake_models, found in ROS_PACKAGE_PATH or in the cache of Drake's"
+        " downloads (default: %(default)s)",
     )
     parser.add_argument(
         "--out", type=Path, default=Path("out"), help="folder to write to (default: %(default)s)"
@@ -103,12 +100,15 @@ def run(args: argparse.Namespace) -> int:
     from lic_drake.perception.config import load_cameras
     from lic_drake.reach.scenario import load_scenario, parse_scenario
     from lic_drake.show.demonstration import demonstrate
+    from lic_drake.show.pr2_meshes import find_drake_models
 
     category = args.category or _USUAL[args.robot]
     usual = _DEMONSTRATIONS[category]
     if usual.robot != args.robot:
         raise LicError(f"{category} is for --robot {usual.robot}, not {args.robot}")
-    meshes = _find_meshes(args.robot) if args.visuals == "drake_models" else []
+    if args.visuals == "drake_models" and args.robot != "pr2":
+        raise LicError(f"--visuals drake_models is for --robot pr2, not {args.robot}; leave it out")
+    drake_models = find_drake_models() if args.visuals == "drake_models" else None
     library = ExperienceLibrary(args.library or shipped_library(usual.library))
     overrides = usual.overrides if args.set is None else args.set
     if usual.library == category:
@@ -117,23 +117,14 @@ def run(args: argparse.Namespace) -> int:
         scenario = load_scenario(category, overrides)
     cameras = None if usual.cameras is None else load_cameras(usual.cameras)
     result = demonstrate(
-        scenario, library, args.method, args.seed, args.out, meshes=meshes, cameras=cameras
+        scenario,
+        library,
+        args.method,
+        args.seed,
+        args.out,
+        drake_models=drake_models,
+        cameras=cameras,
     )
     for kind, path in result.files.items():
         print(f"{kind}: {path}")
     return 0
-
-
-def _find_meshes(robot: str) -> list["LinkMesh"]:
-    """Returns Drake's meshes of the PR2; none, with a line that says why, if they cannot be had."""
-    from lic_drake.errors import LicError, ModelError
-    from lic_drake.show.drake_models import find_drake_models
-    from lic_drake.show.pr2_meshes import read_pr2_meshes
-
-    if robot != "pr2":
-        raise LicError(f"--visuals drake_models is for --robot pr2, not {robot}; leave it out")
-    try:
-        return read_pr2_meshes(find_drake_models())
-    except ModelError as error:
-        print(f"the PR2 keeps the shapes of its own model: {error}")
-        return []

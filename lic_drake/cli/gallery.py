@@ -57,8 +57,7 @@ def run(args: argparse.Namespace) -> int:
     from lic_drake.experience.store import ExperienceLibrary
     from lic_drake.paths import shipped_libraries
     from lic_drake.select.registry import check_method
-    from lic_drake.show.exhibits import choose_exhibits
-    from lic_drake.show.gallery_page import make_page, numbers_of
+    from lic_drake.show.gallery import choose_exhibits, make_gallery, numbers_of
 
     check_method(args.method)
     check_writable(args.out)
@@ -77,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
         )
     ]
     path = args.out / "index.html"
-    page = make_page(exhibits, args.method)
+    page = make_gallery(exhibits, args.method)
     write_atomically(path, lambda temporary: _write(temporary, page))
     if not args.json:
         print(f"page: {path} ({len(page) / 1e6:.1f} MB, {len(exhibits)} trials)")

@@ -150,12 +150,12 @@ def _draw(request: "ReachRequest", path: Path) -> None:
 
 
 def _record(request: "ReachRequest", path: Path) -> None:
-
     from lic_drake.reach.rollout import instance_of, simulate_request
-    from lic_drake.show.recording import ReachRecording
+    from lic_drake.show.recording import Recording
 
-    recording = ReachRecording(request.scenario, instance_of(request), float(request.start.b0[2]))
-    recording.add_reach(simulate_request(request, keep_states=True).trace, request.goal)
+    recording = Recording(request.scenario, instance_of(request))
+    trace = simulate_request(request, keep_states=True).trace
+    recording.add_reach(trace, request.goal, request.start.b0)
     recording.save(path)
 
 

@@ -102,7 +102,7 @@ def add_cameras(
     instance: ClutterInstance,
     p_WG: Vector,
     cameras: CamerasConfig,
-    mobile: bool = False,
+    placeable: bool = False,
 ) -> CameraRig:
     """Adds an environment, a ball at the goal, the robot where it looks from, and the cameras.
 
@@ -111,14 +111,17 @@ def add_cameras(
         instance: The environment.
         p_WG: The goal, shape (3,), metres.
         cameras: The cameras.
-        mobile: Whether the robot's base and torso are joints.
+        placeable: Whether the robot can be placed, see `lic_drake.scene.furnish.place_robot`; it
+            then faces along x.
 
     Raises:
         RenderingError: The renderer does not work on this machine.
     """
     head, external = cameras.head, cameras.external
-    robot = LookingPr2(head.base_pose, head.torso_m, head.tilt_deg, mobile)
-    scene = add_scene(builder, robot, instance, SceneConfig(), visuals=True)
+    base_pose = (0.0, 0.0, 0.0) if placeable else head.base_pose
+    robot = LookingPr2(base_pose, head.torso_m, head.tilt_deg)
+    config = SceneConfig()
+    scene = add_scene(builder, robot, instance, config, visuals=True, placeable=placeable)
     plant, scene_graph = scene.plant, scene.scene_graph
     scene_graph.AddRenderer(RENDERER, make_renderer())
     add_prop(scene_graph, "ball", Sphere(cameras.ball_radius_m), p_WG, BALL_COLOR)

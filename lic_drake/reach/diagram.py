@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.geometry import Meshcat, MeshcatVisualizer, MeshcatVisualizerParams, Role
-from pydrake.multibody.meshcat import ContactVisualizer, ContactVisualizerParams
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from lic_drake.clutter.instance import ClutterInstance
@@ -31,7 +29,6 @@ class ReachDiagram:
     sensor: TactileSensor
     controller: HapticMpcController
     torso_frame: str
-    visualizer: MeshcatVisualizer | None
 
     def set_start(self, context: Context, q: Vector, p_WG: Vector) -> None:
         """Puts the arm at rest at q, with the goal p_WG, in a context of the diagram."""
@@ -54,8 +51,6 @@ class ReachDiagram:
 def make_reach_diagram(
     scenario: Scenario,
     instance: ClutterInstance,
-    meshcat: Meshcat | None = None,
-    base_slides: bool = False,
     torso_m: float | None = None,
 ) -> ReachDiagram:
     """Builds the diagram of one environment.
@@ -63,8 +58,6 @@ def make_reach_diagram(
     Args:
         scenario: Robot, contact, controller.
         instance: The clutter.
-        meshcat: Where to draw the scene and its contact forces, if anywhere.
-        base_slides: Whether the base can be moved, for drawings; see `add_scene`.
         torso_m: Height of the robot's torso, metres; by default as the scenario's task has it.
     """
     builder = DiagramBuilder()
@@ -75,8 +68,6 @@ def make_reach_diagram(
         arm,
         instance,
         scenario.scene,
-        visuals=meshcat is not None,
-        base_slides=base_slides,
     )
     plant = scene.plant
     plant.set_name("plant")
@@ -100,24 +91,6 @@ def make_reach_diagram(
     builder.ExportOutput(sensor.GetOutputPort("taxel_force"), "taxel_force")
     builder.ExportOutput(controller.GetOutputPort("desired_state"), "desired_state")
 
-    visualizer = None
-    if meshcat is not None:
-        visualizer = MeshcatVisualizer.AddToBuilder(
-            builder,
-            scene.scene_graph,
-            meshcat,
-            MeshcatVisualizerParams(role=Role.kIllustration),
-        )
-        ContactVisualizer.AddToBuilder(
-            builder,
-            plant,
-            meshcat,
-            ContactVisualizerParams(
-                newtons_per_meter=50.0,
-                force_threshold=0.05,
-                radius=0.003,
-            ),
-        )
     diagram = builder.Build()
     diagram.set_name("reach")
     return ReachDiagram(
@@ -126,5 +99,4 @@ def make_reach_diagram(
         sensor=sensor,
         controller=controller,
         torso_frame=arm.torso_frame,
-        visualizer=visualizer,
     )

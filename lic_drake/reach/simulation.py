@@ -27,7 +27,6 @@ class Simulation:
         self._config = config
         scene = reach_diagram.scene
         self._plant, self._arm, self._clutter = scene.plant, scene.arm, scene.clutter
-        self._base = scene.base
         self._instance: ClutterInstance | None = None
         self._torso_m: float | None = None
         self._context = reach_diagram.diagram.CreateDefaultContext()
@@ -146,17 +145,8 @@ class Simulation:
         plant.SetPositions(context, self._clutter, state.p_WO.ravel())
         plant.SetVelocities(context, self._clutter, state.v_WO.ravel())
 
-    def set_base(self, p_WR: Vector) -> None:
-        """Puts a base that slides to p_WR, shape (3,), metres; for drawings."""
-        self._plant.SetPositions(self._plant_context, self._base, p_WR[:2])
-
     def look_around(self, q: Vector) -> None:
         """Does nothing: every movable object is awake."""
-
-    def publish(self, time_s: float) -> None:
-        """Draws the present state at a time of the recording."""
-        self._context.SetTime(time_s)
-        self._reach_diagram.diagram.ForcedPublish(self._context)
 
     def take_over_control(self, other: "Simulation") -> None:
         """Takes over the state of the controller from a simulation of the same arm."""

@@ -31,8 +31,6 @@ class LookingPr2(Pr2Arm):
         base_pose: Where the base stands in R: x, y (metres) and heading (radians).
         torso_m: Height of the torso lift, metres.
         head_tilt_deg: How far the head looks down, degrees.
-        mobile: Whether base and torso are joints, as `Pr2Arm` has it; the base then stands at the
-            origin of R.
 
     Raises:
         ScenarioError: Torso or head cannot go there.
@@ -43,9 +41,8 @@ class LookingPr2(Pr2Arm):
         base_pose: Sequence[float],
         torso_m: float,
         head_tilt_deg: float,
-        mobile: bool = False,
     ) -> None:
-        super().__init__((0.0, 0.0, 0.0) if mobile else base_pose, torso_m, mobile)
+        super().__init__(base_pose, torso_m)
         low, high = HEAD_TILT_RANGE_DEG
         if not low <= head_tilt_deg <= high:
             raise ScenarioError(

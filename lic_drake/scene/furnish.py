@@ -12,7 +12,8 @@ from pydrake.multibody.tree import FixedOffsetFrame
 from pydrake.systems.framework import Context
 
 from lic_drake.clutter.instance import ClutterInstance
-from lic_drake.scene.scene import Scene, make_shape, pose_of
+from lic_drake.scene.scene import MOUNT_FRAME, Scene, make_shape, pose_of
+from lic_drake.types import Vector
 
 
 def furnish(scene: Scene, root: Context, instance: ClutterInstance) -> None:
@@ -50,3 +51,18 @@ def raise_torso(scene: Scene, root: Context, torso_frame: str, torso_m: float) -
     frame.SetPoseInParentFrame(
         scene.plant.GetMyMutableContextFromRoot(root), RigidTransform(np.array([0.0, 0.0, torso_m]))
     )
+
+
+def place_robot(scene: Scene, root: Context, b0: Vector) -> None:
+    """Places a robot that was added as `placeable`.
+
+    Args:
+        scene: The scene.
+        root: A context of the diagram that has the scene.
+        b0: Base position (x, y) and torso height, shape (3,), metres.
+    """
+    mount = cast(FixedOffsetFrame, scene.plant.GetFrameByName(MOUNT_FRAME))
+    context = scene.plant.GetMyMutableContextFromRoot(root)
+    mount.SetPoseInParentFrame(context, RigidTransform(np.array([b0[0], b0[1], 0.0])))
+    if scene.torso_frame:
+        raise_torso(scene, root, scene.torso_frame, float(b0[2]))

@@ -12,8 +12,6 @@ FIXED_COLOR = np.array([0.55, 0.25, 0.20, 1.0])
 """Of objects that cannot be pushed, RGBA."""
 MOVABLE_COLOR = np.array([0.95, 0.70, 0.35, 1.0])
 """Of objects that can be pushed, RGBA."""
-BASE_COLOR = np.array([0.35, 0.38, 0.45, 1.0])
-"""Of a mobile base, RGBA."""
 STEM_COLOR = np.array([0.30, 0.42, 0.16, 1.0])
 """Of springy stems, RGBA."""
 BRANCH_COLOR = np.array([0.33, 0.24, 0.15, 1.0])

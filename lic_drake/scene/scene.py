@@ -16,9 +16,8 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
 from pydrake.multibody.tree import (
-    Frame,
+    FixedOffsetFrame,
     ModelInstanceIndex,
-    PrismaticJoint,
     RigidBody,
     SpatialInertia,
     UnitInertia,
@@ -31,10 +30,13 @@ from lic_drake.config import check_numbers
 from lic_drake.errors import ScenarioError
 from lic_drake.robots.arm import Arm
 from lic_drake.scene.contact import ContactConfig, object_properties, skin_properties
-from lic_drake.scene.looks import BASE_COLOR, object_color
+from lic_drake.scene.looks import object_color
 from lic_drake.scene.movables import add_floating_body, add_sliding_body
 from lic_drake.scene.stems import add_stems
 from lic_drake.types import Vector
+
+MOUNT_FRAME = "mount"
+"""Frame that carries a placeable robot; see `lic_drake.scene.furnish.place_robot`."""
 
 TIME_STEP_RANGE_S = (1e-5, 0.1)
 """Shortest and longest step of a discrete plant."""
@@ -95,22 +97,22 @@ class Scene:
         plant: The finalized plant.
         scene_graph: Its scene graph.
         arm: Model instance of the arm.
-        base: Model instance of the mobile base, without any positions where it stands still.
         clutter: Model instance of the movable objects.
         skin_links: Skin geometry -> index into the arm's link names.
         body: Collision geometry of the rest of the robot, which has no skin.
         objects: Collision geometry of each object of the instance.
+        torso_frame: Frame that carries the robot's torso; empty if it has none.
         num_axes: In how many directions its movable objects move, or its stems bend.
     """
 
     plant: MultibodyPlant
     scene_graph: SceneGraph
     arm: ModelInstanceIndex
-    base: ModelInstanceIndex
     clutter: ModelInstanceIndex
     skin_links: dict[GeometryId, int]
     body: tuple[GeometryId, ...]
     objects: tuple[GeometryId, ...]
+    torso_frame: str
     num_axes: int
 
 
@@ -120,7 +122,7 @@ def add_scene(
     instance: ClutterInstance,
     config: SceneConfig,
     visuals: bool = False,
-    base_slides: bool = False,
+    placeable: bool = False,
 ) -> Scene:
     """Adds a plant with the arm and the clutter, and its scene graph, to a builder.
 
@@ -128,8 +130,7 @@ def add_scene(
     of the authors' planar objects is larger than any contact torque, so they never spin. See
     `lic_drake.scene.movables` for what resists them. Stems bend at their roots. Unless `visuals`,
     the objects cannot be seen, which saves a quarter of the time that building takes. With
-    `base_slides` the arm's base has two positions, x and y, for drawings of a robot that moves
-    between reaches; nothing drives it.
+    `placeable` the robot can be moved by `lic_drake.scene.furnish.place_robot`, for pictures.
     """
     plant, scene_graph = AddMultibodyPlant(
         MultibodyPlantConfig(
@@ -141,8 +142,8 @@ def add_scene(
         builder,
     )
     plant.mutable_gravity_field().set_gravity_vector(np.zeros(3))
-    base = plant.AddModelInstance("base")
-    arm_instance = arm.add_to_plant(plant, _add_base(plant, base) if base_slides else None)
+    mount = FixedOffsetFrame(MOUNT_FRAME, plant.world_frame(), RigidTransform())
+    arm_instance = arm.add_to_plant(plant, plant.AddFrame(mount) if placeable else None)
     skin_links = _wear_skin(plant, scene_graph, arm, arm_instance, config.contact)
     clutter = plant.AddModelInstance("clutter")
     objects: list[GeometryId] = []
@@ -182,11 +183,11 @@ def add_scene(
         plant=plant,
         scene_graph=scene_graph,
         arm=arm_instance,
-        base=base,
         clutter=clutter,
         skin_links=skin_links,
         body=_find_body(plant, arm_instance, skin_links),
         objects=tuple(objects),
+        torso_frame=arm.torso_frame,
         num_axes=instance.num_axes,
     )
 
@@ -221,25 +222,6 @@ def _find_body(
         for geometry in plant.GetCollisionGeometriesForBody(plant.get_body(body))
         if geometry not in skin_links
     )
-
-
-def _add_base(plant: MultibodyPlant, base: ModelInstanceIndex) -> Frame:
-    """Adds a base that slides along x and y; returns the frame that carries the arm."""
-    frame = plant.world_frame()
-    for axis, direction in zip("xy", np.eye(3)[:2], strict=True):
-        body = plant.AddRigidBody(
-            f"base_{axis}", base, SpatialInertia(1.0, np.zeros(3), UnitInertia.SolidSphere(0.1))
-        )
-        plant.AddJoint(PrismaticJoint(f"base_{axis}", frame, body.body_frame(), direction))
-        frame = body.body_frame()
-    plant.RegisterVisualGeometry(
-        body,
-        RigidTransform(np.array([-0.1, 0.0, 0.0])),
-        Box(0.2, 0.2, 0.02),
-        "base_visual",
-        BASE_COLOR,
-    )
-    return frame
 
 
 def _add_surroundings(plant: MultibodyPlant) -> RigidBody:

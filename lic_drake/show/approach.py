@@ -1,80 +1,102 @@
-"""How a PR2's arm comes to the start of a reach, and away from it, without touching the board."""
-
-from collections.abc import Callable
+"""How a PR2's arm gets to the start of a reach, and back, without touching the board."""
 
 import numpy as np
 
+from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.reach.pointing_starts import mobile_positions
-from lic_drake.robots.pr2 import Pr2Arm, pr2_arm
+from lic_drake.reach.scenario import Scenario
+from lic_drake.robots.pr2 import Pr2Arm
 from lic_drake.scene.collision import CollisionChecker
 from lic_drake.seeds import make_generator
-from lic_drake.show.motion_planning import is_path_free, plan_motion
 from lic_drake.types import Vector
 
-MAX_NEWTON_STEPS = 10
-"""Of the inverse kinematics along that way; where they do not suffice, the way ends."""
-
 WAITING_DEG = np.array([-70.0, 40.0, -90.0, -125.0, 0.0, -60.0, 0.0])
-"""A posture of ours for looking and driving: elbow out to the side, hand close before the body."""
+"""Our posture for observing and driving: elbow out to the side, hand close to the body."""
 
 RETREAT_M = 0.3
-"""The tool comes straight into an aperture from so far away, where the joint limits allow it."""
+"""Length of the tool's straight way into an aperture, where the joint limits allow it, metres."""
 
 RETREAT_STEP_M = 0.01
-"""Steps of that way."""
+"""Steps of that way, metres."""
+
+MAX_NEWTON_STEPS = 10
+"""Iterations of the inverse kinematics along that way."""
+
+CHECKED_RAD = 0.03
+"""Distance of checked configurations along a path, radians."""
+
+VIA_POINTS = 1000
+"""Number of random via points that are tried where the direct way is not free."""
 
 
-def plan_approach(checker: CollisionChecker, b0: Vector, q_start: Vector) -> Vector | None:
-    """Returns a path of the arm from its waiting posture to a start, shape (k, 7), radians.
+class Approach:
+    """Plans the arm's way between its waiting posture and a start.
 
-    Its last part is straight for the tool. None if no path was found: the start may lie in a
-    pocket.
-
-    Args:
-        checker: The mobile robot before the board.
-        b0: Place of the base and height of the torso, shape (3,), metres.
-        q_start: Joint angles at the start, shape (7,), radians.
+    Attributes:
+        waiting: The waiting posture, shape (7,), radians.
     """
-    arm = pr2_arm().raised(float(b0[2]))
 
-    def is_free(q: Vector) -> bool:
-        return not checker.touches(mobile_positions(b0, q[None])[0])
+    def __init__(self, scenario: Scenario, instance: ClutterInstance) -> None:
+        """Builds the collision checker.
 
-    way_out = _retreat(arm, is_free, q_start)
-    way = plan_motion(
-        is_free,
-        arm.q_min,
-        arm.q_max,
-        np.deg2rad(WAITING_DEG),
-        way_out[-1],
-        make_generator("evaluation", "approach"),
-    )
-    return None if way is None else np.vstack([way, way_out[-2::-1]])
+        Args:
+            scenario: Robot and contact.
+            instance: The environment.
+        """
+        self.waiting = np.deg2rad(WAITING_DEG)
+        self._arm = Pr2Arm()
+        self._checker = CollisionChecker(Pr2Arm(mobile=True), instance, scenario.scene)
 
+    def path(self, b0: Vector, q_start: Vector) -> Vector:
+        """Returns a path from the waiting posture to a start, shape (k, 7), radians.
 
-def _retreat(arm: Pr2Arm, is_free: Callable[[Vector], bool], q_start: Vector) -> Vector:
-    """Returns joint angles that draw the tool back as far as the arm can, shape (k, 7)."""
-    path = [q_start]
-    p_RE, R_RE = arm.tip_position(q_start), arm.tip_rotation(q_start)
-    for k in range(1, round(RETREAT_M / RETREAT_STEP_M) + 1):
-        q = _follow(arm, path[-1], p_RE - k * RETREAT_STEP_M * R_RE[:, 0], R_RE)
-        if q is None or not is_path_free(is_free, path[-1], q):
-            break
-        path.append(q)
-    return np.array(path)
+        Its last part is straight for the tool. Where no free path is found, for instance because
+        the start lies in a pocket, the arm moves straight in joint space.
 
+        Args:
+            b0: Base position and torso height, shape (3,), metres.
+            q_start: Joint angles at the start, shape (7,), radians.
+        """
+        way_in = self._retreat(b0, q_start)[::-1]
+        begin, end = self.waiting, way_in[0]
+        rng = make_generator("evaluation", "approach")
+        via = end
+        for _ in range(VIA_POINTS):
+            if self._is_free(b0, begin, via) and self._is_free(b0, via, end):
+                return np.vstack([begin, via, way_in])
+            near = end + rng.normal(0.0, 0.1 + 1.5 * rng.random(), len(end))
+            via = np.clip(near, self._arm.q_min, self._arm.q_max)
+        return np.array([begin, q_start])
 
-def _follow(arm: Pr2Arm, q: Vector, p_RE: Vector, R_RE: Vector) -> Vector | None:
-    """Returns joint angles near q that bring the tool to a pose near its own, or None."""
-    for _ in range(MAX_NEWTON_STEPS):
-        R = arm.tip_rotation(q)
-        # The rotation that is missing, as a vector; exact to second order.
-        turn = 0.5 * np.cross(R, R_RE, axis=0).sum(axis=1)
-        error = np.concatenate([p_RE - arm.tip_position(q), turn])
-        if np.abs(error).max() < 1e-4:
-            return q
-        J = np.vstack([arm.tip_jacobian(q), arm.tip_angular_jacobian(q)])
-        q = q + J.T @ np.linalg.solve(J @ J.T + 1e-6 * np.eye(6), error)
-        if np.any(q < arm.q_min) or np.any(q > arm.q_max):
-            return None
-    return None
+    def _is_free(self, b0: Vector, q_from: Vector, q_to: Vector) -> bool:
+        """Returns whether the arm touches nothing on a straight line in joint space."""
+        steps = max(1, int(np.ceil(np.abs(q_to - q_from).max() / CHECKED_RAD)))
+        line = q_to + np.linspace(0.0, 1.0, steps + 1)[:-1, np.newaxis] * (q_from - q_to)
+        return not any(self._checker.touches(q) for q in mobile_positions(b0, line))
+
+    def _retreat(self, b0: Vector, q_start: Vector) -> Vector:
+        """Returns joint angles that draw the tool back as far as possible, shape (k, 7)."""
+        path = [q_start]
+        p_RE, R_RE = self._arm.tip_position(q_start), self._arm.tip_rotation(q_start)
+        for k in range(1, round(RETREAT_M / RETREAT_STEP_M) + 1):
+            q = self._follow(path[-1], p_RE - k * RETREAT_STEP_M * R_RE[:, 0], R_RE)
+            if q is None or not self._is_free(b0, path[-1], q):
+                break
+            path.append(q)
+        return np.array(path)
+
+    def _follow(self, q: Vector, p_RE: Vector, R_RE: Vector) -> Vector | None:
+        """Returns joint angles near q that bring the tool to a nearby pose, or None."""
+        arm = self._arm
+        for _ in range(MAX_NEWTON_STEPS):
+            R = arm.tip_rotation(q)
+            # The missing rotation as a vector, exact to second order.
+            turn = 0.5 * np.cross(R, R_RE, axis=0).sum(axis=1)
+            error = np.concatenate([p_RE - arm.tip_position(q), turn])
+            if np.abs(error).max() < 1e-4:
+                return q
+            J = np.vstack([arm.tip_jacobian(q), arm.tip_angular_jacobian(q)])
+            q = q + J.T @ np.linalg.solve(J @ J.T + 1e-6 * np.eye(6), error)
+            if np.any(q < arm.q_min) or np.any(q > arm.q_max):
+                return None
+        return None

@@ -1,46 +1,105 @@
-"""The estimated probability of success over all starts (paper Fig. 6), as numbers."""
+"""The estimated probability of success over a planar arm's starts (paper Fig. 6)."""
+
+from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-from lic_drake.reach.start import Starts
-from lic_drake.reach.starts import PlanarStarts, Region
+from lic_drake.evaluate.trial import Attempt
+from lic_drake.reach.start import Start, Starts
+from lic_drake.reach.starts import PlanarStarts, Region, find_region
+from lic_drake.reach.starts import Starts as FeasibleStarts
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.situation import Situation
+from lic_drake.show.figures import ATTEMPT_COLORS, estimate_title, situations
 from lic_drake.types import Vector
 
 DENSITY_SHAPE = (81, 91)
 """Lattice of a density: y every 1 cm, phi every 2 degrees."""
 
 
-def density_lattice(starts: PlanarStarts, region: Region) -> tuple[Starts, tuple[int, int]]:
-    """Returns initial conditions over a whole start line, possible or not, and their shape.
+def densities_figure(
+    selector: LicSelector, starts: FeasibleStarts, attempts: Sequence[Attempt]
+) -> Figure:
+    """Returns the estimates over all starts before each attempt.
+
+    Args:
+        selector: Whose estimates to draw; the attempts may be another strategy's.
+        starts: The feasible starts.
+        attempts: The attempts, all but the last one failures.
+    """
+    figure = Figure(figsize=(7.0 * len(attempts), 4.5))
+    axes = figure.subplots(1, len(attempts), squeeze=False)[0]
+    before = situations(attempts, [starts] * len(attempts))
+    for ax, (number, attempt, situation) in zip(axes, before, strict=True):
+        chosen = attempt.request.start
+        region = find_region(situation.planar_starts.regions, chosen.x0, chosen.b0[:2])
+        assert region is not None  # Selections lie in one.
+        lattice = density_lattice(situation.planar_starts, region)
+        draw_density(ax, lattice, estimate_density(selector, situation, lattice), chosen, number)
+        ax.set_title(estimate_title(selector, number, attempt), fontsize=10)
+    return figure
+
+
+def density_lattice(starts: PlanarStarts, region: Region) -> Starts:
+    """Returns a lattice of starts over a start line, feasible or not; phi varies fastest.
 
     Where the base moves, the hand is in the centre of an aperture and the base varies; relative to
     the base these are the same poses.
 
     Args:
-        starts: The possible ones.
+        starts: The feasible starts.
         region: One of their regions: the line, or an aperture.
-
-    Returns:
-        n initial conditions of which phi varies fastest, and the numbers of y and phi values.
     """
     line = starts.poses.line
     y = np.linspace(line.lower[1], line.upper[1], DENSITY_SHAPE[0])
     phi = np.linspace(line.lower[2], line.upper[2], DENSITY_SHAPE[1])
     poses = np.array([[line.x_m, yi, phi_i] for yi in y for phi_i in phi])
-    if region.lower[1] < region.upper[1]:
-        return Starts(poses, np.zeros((len(poses), 3))), DENSITY_SHAPE
-    p_WA = region.lower[:2]
-    b0 = np.column_stack([p_WA - poses[:, :2], np.zeros(len(poses))])
-    return Starts(poses + b0, b0), DENSITY_SHAPE
+    b0 = np.zeros_like(poses)
+    if region.lower[1] == region.upper[1]:
+        b0[:, :2] = region.lower[:2] - poses[:, :2]
+    return Starts(poses + b0, b0)
 
 
-def estimate_density(selector: LicSelector, situation: Situation, conditions: Starts) -> Vector:
-    """Returns the estimates at n initial conditions, shape (n,), NaN where the arm cannot start."""
+def estimate_density(selector: LicSelector, situation: Situation, lattice: Starts) -> Vector:
+    """Returns the estimates at n starts, shape (n,), NaN where the arm cannot start."""
     arm = situation.planar_starts.poses.arm
-    possible = np.array([arm.solve_ik(x0) is not None for x0 in conditions.in_R])
-    density = np.full(len(possible), np.nan)
-    objective = selector.objective(situation)
-    density[possible] = np.clip(objective.values(conditions.take(possible)), 0.0, 1.0)
+    feasible = np.array([arm.solve_ik(x0) is not None for x0 in lattice.in_R])
+    density = np.full(len(feasible), np.nan)
+    values = selector.objective(situation).values(lattice.take(feasible))
+    density[feasible] = np.clip(values, 0.0, 1.0)
     return density
+
+
+def draw_density(
+    ax: Axes, lattice: Starts, probability: Vector, chosen: Start, number: int = 1
+) -> Axes:
+    """Draws estimates over a lattice of starts.
+
+    Args:
+        ax: Where to draw.
+        lattice: As `density_lattice` returns it, n starts.
+        probability: Estimates there, shape (n,); NaN where the arm cannot start.
+        chosen: The start that was selected.
+        number: Number of the attempt from it.
+    """
+    y, phi = (lattice.in_R[:, k].reshape(DENSITY_SHAPE) for k in (1, 2))
+    values = probability.reshape(DENSITY_SHAPE)
+    image = ax.pcolormesh(y, phi, values, cmap="jet", vmin=0.0, vmax=1.0, shading="nearest")
+    ax.plot(
+        *chosen.x0_R[1:],
+        marker="*",
+        markersize=16,
+        color=ATTEMPT_COLORS[(number - 1) % len(ATTEMPT_COLORS)],
+        markeredgecolor="white",
+        linestyle="none",
+        clip_on=False,
+        zorder=5,
+        label=f"attempt {number}",
+    )
+    ax.set(xlabel="start position y [m]", ylabel="start orientation φ [rad]", facecolor="0.9")
+    ax.legend(loc="lower right", fontsize=8)
+    if ax.figure is not None:
+        ax.figure.colorbar(image, ax=ax, label="estimated probability of success")
+    return ax

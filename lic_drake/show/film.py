@@ -1,48 +1,45 @@
-"""What the cameras see while the robot reaches: a film of both views."""
+"""What both cameras see while the robot reaches, as an animated picture."""
 
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
-from pydrake.systems.framework import Context, DiagramBuilder
-from pydrake.systems.sensors import ImageRgba8U, RgbdSensor
+from pydrake.systems.framework import DiagramBuilder
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import LicError
-from lic_drake.perception.cameras import add_cameras
+from lic_drake.perception.cameras import add_cameras, take_color_image
 from lic_drake.perception.config import CameraConfig, CamerasConfig
-from lic_drake.reach.pointing_starts import mobile_positions
 from lic_drake.reach.trace import SceneState
+from lic_drake.show.stage import place
 from lic_drake.types import Vector
 
 SHRINK = 2
-"""A film has so many times fewer columns and rows than the cameras."""
+"""Factor by which a film's images are smaller than the cameras'."""
 
 
 class FilmCamera:
-    """Films states of an environment, as they were simulated elsewhere, with both cameras.
-
-    Args:
-        instance: The environment.
-        p_WG: Where the ball is, shape (3,), metres.
-        cameras: The cameras; the head's moves with the robot.
-
-    Raises:
-        RenderingError: Cameras cannot be simulated on this machine.
-    """
+    """Films states of an environment with both cameras; the head camera moves with the robot."""
 
     def __init__(self, instance: ClutterInstance, p_WG: Vector, cameras: CamerasConfig) -> None:
+        """Builds the scene.
+
+        Args:
+            instance: The environment.
+            p_WG: Position of the ball, shape (3,), metres.
+            cameras: The cameras.
+
+        Raises:
+            RenderingError: Cameras cannot be simulated on this machine.
+        """
         builder = DiagramBuilder()
-        small = replace(
-            cameras,
-            head=replace(cameras.head, camera=_shrunk(cameras.head.camera)),
-            external=replace(cameras.external, camera=_shrunk(cameras.external.camera)),
-        )
-        self._rig = add_cameras(builder, instance, p_WG, small, mobile=True)
+        head = replace(cameras.head, camera=_shrunk(cameras.head.camera))
+        external = replace(cameras.external, camera=_shrunk(cameras.external.camera))
+        small = replace(cameras, head=head, external=external)
+        self._rig = add_cameras(builder, instance, p_WG, small, placeable=True)
         self._diagram = builder.Build()
         self._context = self._diagram.CreateDefaultContext()
 
@@ -50,25 +47,21 @@ class FilmCamera:
         """Returns the head's view and the external one side by side, shape (height, width, 3).
 
         Args:
-            b0: Place of the base and height of the torso, shape (3,), metres.
+            b0: Base position and torso height, shape (3,), metres.
             state: Where arm and clutter are.
         """
-        scene = self._rig.scene
-        plant = scene.plant
-        context = plant.GetMyMutableContextFromRoot(self._context)
-        plant.SetPositions(context, scene.arm, mobile_positions(b0, state.q[None])[0])
-        plant.SetPositions(context, scene.clutter, state.p_WO.ravel())
-        views = [_colors(sensor, self._context) for sensor in (self._rig.head, self._rig.external)]
-        return np.hstack(views)
+        place(self._rig.scene, self._context, b0, state.q, state)
+        sensors = (self._rig.head, self._rig.external)
+        return np.hstack([take_color_image(sensor, self._context) for sensor in sensors])
 
 
 def save_film(frames: Iterable[NDArray[np.uint8]], frames_per_second: float, path: Path) -> None:
-    """Writes an animated WebP picture, which browsers play over and over.
+    """Writes an animated WebP picture, which browsers play in a loop.
 
     Args:
         frames: At least one, each of shape (height, width, 3).
-        frames_per_second: How fast it plays.
-        path: Where it goes.
+        frames_per_second: Playback speed.
+        path: The file.
 
     Raises:
         LicError: It cannot be written.
@@ -95,10 +88,3 @@ def _shrunk(camera: CameraConfig) -> CameraConfig:
         height=max(16, camera.height // SHRINK),
         focal_px=camera.focal_px / SHRINK,
     )
-
-
-def _colors(sensor: RgbdSensor, root: Context) -> NDArray[np.uint8]:
-    port = sensor.color_image_output_port()
-    rgba = cast(ImageRgba8U, port.Eval(sensor.GetMyContextFromRoot(root)))
-    # A copy: what Drake returns may be a view of its own memory.
-    return np.array(np.asarray(rgba.data)[..., :3])

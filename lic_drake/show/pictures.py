@@ -1,175 +1,161 @@
-"""What a demonstration shows of its attempts: a recording and pictures."""
+"""What a demonstration shows of its attempts: a recording, figures, stills, a film and a page."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
-from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.evaluate.trial import Attempt
+from lic_drake.perception.observer import Observer
 from lic_drake.reach.pointing_starts import PointingStarts
-from lic_drake.reach.request import ReachRecord, ReachRequest
-from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.starts import Starts
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.select.lic import LicSelector
-from lic_drake.select.situation import FailedReach, Situation
-from lic_drake.show.aperture_map import draw_aperture_map, estimate_apertures
-from lic_drake.show.attempt_figures import densities_figure
-from lic_drake.show.mobile_recording import MobileRecording
-from lic_drake.show.plots import ATTEMPT_COLORS, draw_top_view, save_figure
-from lic_drake.show.pr2_meshes import LinkMesh
-from lic_drake.show.recording import ReachRecording
-from lic_drake.types import Vector
+from lic_drake.show.apertures import apertures_figure
+from lic_drake.show.approach import Approach
+from lic_drake.show.density import densities_figure
+from lic_drake.show.detections import look_figure, maps_figure
+from lic_drake.show.figures import ShownTrial, save_figure
+from lic_drake.show.film import FilmCamera, save_film
+from lic_drake.show.page import embed, make_page, picture
+from lic_drake.show.recording import Recording
+from lic_drake.show.stage import in_plane
+from lic_drake.show.stills import save_stills
+from lic_drake.show.views import SIDE, TOP, draw_view
+
+FRAMES_PER_SECOND = 2.0
+"""Frames of the film per simulated second."""
+
+FILM_SPEED = 2.0
+"""Playback speed of the film, relative to the reach."""
+
+_OLD = (
+    *("density.png", "apertures.png", "look[1-9].png", "views.webp", "sequence.html"),
+    *(f"attempt[1-9]_{moment}.png" for moment in ("start", "middle", "end", "inside")),
+)
 
 
-class Pictures(Protocol):
-    """Collects attempts and draws them."""
-
-    @property
-    def num_attempts(self) -> int:
-        """Number of attempts so far."""
-        ...
-
-    def add(self, request: ReachRequest, record: ReachRecord, trace: ReachTrace) -> None:
-        """Records an attempt."""
-        ...
-
-    def save(self, out: Path, selector: LicSelector, done: Sequence[Attempt]) -> dict[str, Path]:
-        """Writes everything into a folder; returns the files by kind."""
-        ...
+def remove_pictures(out: Path) -> None:
+    """Removes an earlier demonstration's pictures, some of which a new one may not have."""
+    for old in (path for pattern in _OLD for path in out.glob(pattern)):
+        old.unlink()
 
 
-class PlanarPictures:
-    """A planar reach: densities over the start line and a view from above."""
+def save_pictures(
+    trial: ShownTrial,
+    selector: LicSelector,
+    known: Observer | Starts,
+    out: Path,
+    say: Callable[[str], None] = print,
+    drake_models: Path | None = None,
+) -> dict[str, Path]:
+    """Writes demo.html, path.png and the stills of `lic_drake.show.stills.save_stills`.
 
-    def __init__(
-        self, scenario: Scenario, instance: ClutterInstance, starts: Starts, p_WG: Vector
-    ) -> None:
-        self._scenario, self._instance, self._starts = scenario, instance, starts
-        self._p_WG = p_WG
-        self._recording = ReachRecording(scenario, instance)
-        self._traces: list[ReachTrace] = []
+    In the plane also density.png, in front of a board apertures.png, and with cameras look1.png and
+    so on, views.webp (a film of both cameras) and sequence.html (all of it on one page).
 
-    @property
-    def num_attempts(self) -> int:
-        """Number of attempts so far."""
-        return len(self._traces)
+    Args:
+        trial: What to show.
+        selector: Whose estimates to draw.
+        known: What the robot observed, or the feasible starts if it knows them.
+        out: The folder.
+        say: Gets a line if stills cannot be rendered.
+        drake_models: Folder of package://drake_models, to show a PR2 in its meshes.
 
-    def add(self, request: ReachRequest, record: ReachRecord, trace: ReachTrace) -> None:
-        """Records an attempt."""
-        self._recording.add_reach(trace, self._p_WG)
-        self._traces.append(trace)
+    Returns:
+        The files by kind.
 
-    def save(self, out: Path, selector: LicSelector, done: Sequence[Attempt]) -> dict[str, Path]:
-        """Writes demo.html, density.png and path.png."""
-        files = {
-            "recording": out / "demo.html",
-            "density": out / "density.png",
-            "path": out / "path.png",
-        }
-        self._recording.save(files["recording"])
-        save_figure(densities_figure(selector, self._starts, self._p_WG, done), files["density"])
-        figure = Figure(figsize=(7, 7))
-        draw_top_view(
-            figure.subplots(),
-            self._scenario,
-            self._instance,
-            self._p_WG,
-            list(zip(attempt_labels(done), self._traces, strict=True)),
-        )
-        save_figure(figure, files["path"])
-        return files
+    Raises:
+        LicError: A file cannot be written.
+    """
+    attempts = trial.attempts
+    recording = record_trial(trial, drake_models)
+    files: dict[str, Path] = {"recording": out / "demo.html"}
+    recording.save(files["recording"])
 
+    def save(kind: str, name: str, figure: Figure) -> None:
+        files[kind] = out / name
+        save_figure(figure, files[kind])
 
-class AperturePictures:
-    """A PR2 before a board: what was estimated for each aperture, and the tool's paths."""
-
-    def __init__(
-        self,
-        scenario: Scenario,
-        instance: ClutterInstance,
-        starts: PointingStarts,
-        p_WG: Vector,
-        meshes: Sequence[LinkMesh] = (),
-    ) -> None:
-        self._instance, self._starts, self._p_WG = instance, starts, p_WG
-        self._recording = MobileRecording(scenario, instance, meshes)
-        self._traces: list[ReachTrace] = []
-
-    @property
-    def num_attempts(self) -> int:
-        """Number of attempts so far."""
-        return len(self._traces)
-
-    def add(self, request: ReachRequest, record: ReachRecord, trace: ReachTrace) -> None:
-        """Records base, torso and arm moving to the start, and the reach."""
-        if self._traces:
-            self._recording.retract(self._traces[-1])
-        b0 = request.start.b0
-        if trace.q:
-            self._recording.move_to(b0, trace.q[0])
-        self._recording.add_reach(trace, self._p_WG, b0)
-        self._traces.append(trace)
-
-    def save(self, out: Path, selector: LicSelector, done: Sequence[Attempt]) -> dict[str, Path]:
-        """Writes demo.html, apertures.png and path.png."""
-        files = {
-            "recording": out / "demo.html",
-            "apertures": out / "apertures.png",
-            "path": out / "path.png",
-        }
-        self._recording.save(files["recording"])
-        save_figure(self._aperture_figure(selector, done), files["apertures"])
-        save_figure(self._path_figure(done), files["path"])
-        return files
-
-    def _aperture_figure(self, selector: LicSelector, done: Sequence[Attempt]) -> Figure:
-        """Returns a map before each attempt."""
-        starts = self._starts
-        figure = Figure(figsize=(6.5 * len(done), 4.5))
-        axes = figure.subplots(1, len(done), squeeze=False)[0]
-        for number, (ax, attempt) in enumerate(zip(axes, done, strict=True), start=1):
-            failed = tuple(FailedReach.from_record(a.record) for a in done[: number - 1])
-            situation = Situation(p_WG=self._p_WG, starts=starts, failed=failed)
-            draw_aperture_map(
-                ax,
-                starts.p_WA,
-                estimate_apertures(selector.objective(situation), starts),
-                starts.all_apertures,
-                starts.aperture_m,
-                self._p_WG,
-                [(f"attempt {number}", attempt.selection.start.x0[:3])],
-            )
-            model = 1 if selector.second is None else min(number, 2)
-            ax.set_title(f"LIC-{model} ({selector.method}): {attempt.record.outcome}", fontsize=10)
-        return figure
-
-    def _path_figure(self, done: Sequence[Attempt]) -> Figure:
-        """Returns the tool's paths, from above and from the side."""
-        figure = Figure(figsize=(6, 7), layout="constrained")
-        for ax, (across, name) in zip(figure.subplots(1, 2), ((1, "y"), (2, "z")), strict=True):
-            for i in range(self._instance.num_objects):
-                p, size = self._instance.p_WO[i], self._instance.size[i]
-                if self._instance.movable[i]:
-                    ax.plot(p[0], p[across], "o", ms=11, color="0.85", zorder=0)
-                else:
-                    ends = p[across] + 0.5 * size[across] * np.array([-1.0, 1.0])
-                    ax.plot([p[0], p[0]], ends, color="0.45", lw=2, zorder=1)
-            labels = attempt_labels(done)
-            for i, (label, trace) in enumerate(zip(labels, self._traces, strict=True)):
-                path = np.array(trace.p_WE).reshape(-1, 3)
-                color = ATTEMPT_COLORS[i % len(ATTEMPT_COLORS)]
-                ax.plot(path[:, 0], path[:, across], color=color, lw=2, label=label, zorder=3)
-            ax.plot(self._p_WG[0], self._p_WG[across], "o", ms=7, color="tab:cyan", zorder=4)
-            ax.set(xlabel="x [m]", ylabel=f"{name} [m]", aspect="equal")
-            ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=8)
-        return figure
+    save("path", "path.png", _path_figure(trial))
+    if isinstance(known, Observer):
+        save("apertures", "apertures.png", maps_figure(selector, known, attempts))
+        for number in range(1, len(attempts) + 1):
+            figure = look_figure(selector, known, attempts, number)
+            save(f"look {number}", f"look{number}.png", figure)
+        if any(trace.states for trace in trial.traces):
+            files["views"] = out / "views.webp"
+            save_film(_film(trial, known), FILM_SPEED * FRAMES_PER_SECOND, files["views"])
+        files["sequence"] = out / "sequence.html"
+        page = _sequence_page(known, attempts, files, recording)
+        files["sequence"].write_text(page, encoding="utf-8")
+    elif isinstance(known, PointingStarts):
+        save("apertures", "apertures.png", apertures_figure(selector, known, attempts))
+    else:
+        save("density", "density.png", densities_figure(selector, known, attempts))
+    return files | save_stills(trial, out, say, drake_models)
 
 
-def attempt_labels(done: Sequence[Attempt]) -> list[str]:
-    """Returns a label for each attempt: which one it is and how it ended."""
-    words = ("first", "second", "third", "fourth", "fifth")
-    return [f"{words[i]} start: {attempt.record.outcome}" for i, attempt in enumerate(done)]
+def record_trial(trial: ShownTrial, drake_models: Path | None = None) -> Recording:
+    """Returns a recording of all attempts; a PR2 moves base, torso and arm to each start."""
+    scenario, instance = trial.scenario, trial.instance
+    approach = None if in_plane(scenario) else Approach(scenario, instance)
+    recording = Recording(scenario, instance, drake_models, approach)
+    before: ReachTrace | None = None
+    for attempt, trace in trial:
+        b0 = attempt.request.start.b0
+        if approach is not None and trace.q:
+            if before is not None:
+                recording.retract(before)
+            recording.move_to(b0, trace.q[0])
+            before = trace
+        recording.add_reach(trace, trial.p_WG, b0)
+    return recording
+
+
+def _film(trial: ShownTrial, observer: Observer) -> Iterator[NDArray[np.uint8]]:
+    camera = FilmCamera(trial.instance, trial.p_WG, observer.cameras)
+    step = max(1, round(trial.scenario.mpc.rate_hz / FRAMES_PER_SECOND))
+    for attempt, trace in trial:
+        for state in trace.states[::step]:
+            yield camera.frame(attempt.request.start.b0, state)
+
+
+def _path_figure(trial: ShownTrial) -> Figure:
+    """Returns views of all attempts from above and, in space, from the side."""
+    views = (TOP,) if in_plane(trial.scenario) else (TOP, SIDE)
+    figure = Figure(figsize=(7 * len(views), 7), layout="constrained")
+    for ax, axes in zip(figure.subplots(1, len(views), squeeze=False)[0], views, strict=True):
+        labelled = trial.labelled_traces()
+        draw_view(ax, trial.scenario, trial.instance, trial.p_WG, labelled, axes)
+    return figure
+
+
+def _sequence_page(
+    observer: Observer,
+    attempts: Sequence[Attempt],
+    files: Mapping[str, Path],
+    recording: Recording,
+) -> str:
+    """Returns the whole sequence of looks and reaches as one page (paper Fig. 2)."""
+    word = "reached" if observer.touches_ball(attempts[-1].record) else "not reached"
+    parts = [
+        "<p>The robot looks, selects an aperture, a place for its base and a height for its torso,"
+        " moves base, torso and arm in that order, and reaches. After a failure it looks and"
+        " selects again. Arrows are contact forces.</p>",
+        embed(recording.html(), height_px=540),
+    ]
+    if "views" in files:
+        words = "The head camera and the external camera"
+        parts.append(picture(files["views"].read_bytes(), "image/webp", words))
+    for number, attempt in enumerate(attempts, start=1):
+        words = f"Look {number}: open apertures, passable probabilities and goal. Attempt {number}:"
+        words += f" {attempt.record.outcome}"
+        if attempt.selection.probability is not None:
+            words += f", estimated success {100.0 * attempt.selection.probability:.0f} %"
+        data = files[f"look {number}"].read_bytes()
+        parts.append(picture(data, "image/png", words + "."))
+    title = f"{observer.scenario.category}, environment {observer.environment}: {word}"
+    return make_page(title, "\n".join(parts))

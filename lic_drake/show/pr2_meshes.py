@@ -1,171 +1,166 @@
-"""The meshes of Drake's public PR2, placed on the links of models/pr2/pr2.urdf."""
+"""Shows the PR2 in the meshes of Drake's own model, package://drake_models."""
 
 import logging
-from collections.abc import Collection, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass
+import os
 from pathlib import Path
 from typing import cast
-from xml.etree import ElementTree
 
-import numpy as np
-from pydrake.geometry import GeometryProperties, Mesh, Rgba, Role, SceneGraph
-from pydrake.math import RigidTransform
+from pydrake.geometry import (
+    FrameId,
+    GeometryInstance,
+    GeometryProperties,
+    IllustrationProperties,
+    Mesh,
+    PerceptionProperties,
+    RenderLabel,
+    Rgba,
+    Role,
+    SceneGraph,
+)
 from pydrake.multibody.parsing import PackageMap, Parser
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import BodyIndex, ModelInstanceIndex
 
 from lic_drake.errors import ModelError
-from lic_drake.robots.pr2_description import add_pr2
-from lic_drake.show.drake_models import PACKAGE
-from lic_drake.types import Vector
+from lic_drake.scene.scene import Scene
+
+PACKAGE = "drake_models"
+"""Name of the package."""
 
 DESCRIPTION = Path("pr2_description", "urdf", "pr2_simplified.urdf")
 """The PR2 in the package."""
 
-_PARTS = {"head_pan_link": ("head", "torso_lift_link")}
-"""Links of the source that ours has under another name, and the source's link of the same frame."""
+_HEAD_PARTS = ("head_pan_link", "head_tilt_link")  # One link of ours, in the torso's frame.
 
 
-@dataclass(frozen=True, kw_only=True)
-class LinkMesh:
-    """A mesh that a link wears.
-
-    Attributes:
-        link: Name of the link in models/pr2/pr2.urdf.
-        path: The mesh's file.
-        scale: Along its axes, shape (3,).
-        X_LM: Pose of the mesh in the link's frame.
-        color: RGBA, shape (4,), each 0 to 1; None where the file has colours of its own.
-    """
-
-    link: str
-    path: Path
-    scale: Vector
-    X_LM: RigidTransform
-    color: Vector | None
-
-
-def read_pr2_meshes(package: Path) -> list[LinkMesh]:
-    """Returns what the links look like, gripper closed and head level, as in our model.
-
-    Args:
-        package: Folder of package://drake_models.
+def find_drake_models() -> Path:
+    """Returns the folder of the package, in ROS_PACKAGE_PATH or in the cache of Drake's downloads.
 
     Raises:
-        ModelError: It has no PR2, or one that cannot be read.
+        ModelError: It is in neither of them.
+    """
+    packages = PackageMap.MakeEmpty()
+    packages.PopulateFromRosPackagePath()
+    if packages.Contains(PACKAGE):
+        return Path(packages.GetPath(PACKAGE))
+    os.environ.setdefault("DRAKE_ALLOW_NETWORK", "none")
+    try:
+        return Path(PackageMap().GetPath(PACKAGE))
+    except RuntimeError:
+        raise ModelError(
+            f"package://{PACKAGE} is not on this machine; name a folder that holds it in"
+            " ROS_PACKAGE_PATH, or set DRAKE_ALLOW_NETWORK=package_map to let Drake download it"
+        ) from None
+
+
+def attach_pr2_meshes(scene: Scene, package: Path) -> list[Path]:
+    """Attaches visual-only meshes in place of the links' shapes; collision geometry is unchanged.
+
+    Gripper closed and head level, as in models/pr2/pr2.urdf.
+
+    Args:
+        scene: A scene with a PR2, not yet built into a diagram.
+        package: The folder of package://drake_models.
+
+    Returns:
+        The files of the meshes.
+
+    Raises:
+        ModelError: The package has no PR2, or one that cannot be read.
     """
     path = package / DESCRIPTION
-    try:
-        meshes = _place(*_parse(_looks_only(path), package))
-    except (OSError, ElementTree.ParseError, RuntimeError) as error:
-        reason = " ".join(str(error).split())
-        raise ModelError(f"the PR2's meshes cannot be read from {path}: {reason}") from None
-    if not meshes:
-        raise ModelError(f"{path} has no mesh for any link of models/pr2/pr2.urdf")
-    return meshes
-
-
-def _place(
-    plant: MultibodyPlant, scene_graph: SceneGraph, pr2: ModelInstanceIndex
-) -> list[LinkMesh]:
-    """Returns the meshes of the source in the frames of our links."""
-    ours = _own_links()
-    context = plant.CreateDefaultContext()
-    parents = {
-        joint.child_body().index(): joint.parent_body().index()
-        for joint in map(plant.get_joint, plant.GetJointIndices())
-    }
-    meshes = []
-    inspector = scene_graph.model_inspector()
-    for index in plant.GetBodyIndices(pr2):
-        body = plant.get_body(index)
-        X_WB = plant.EvalBodyPoseInWorld(context, body)
-        name = _carrier(plant, index, parents, {*ours, *_PARTS})
-        link, frame = _PARTS.get(name, (name, name))
-        if link not in ours:
-            continue
-        X_LW = plant.GetFrameByName(frame, pr2).CalcPoseInWorld(context).inverse()
-        for geometry in plant.GetVisualGeometriesForBody(body):
-            mesh = inspector.GetShape(geometry)
-            if isinstance(mesh, Mesh):  # Boxes of the source mark frames.
-                meshes.append(
-                    LinkMesh(
-                        link=link,
-                        path=Path(mesh.source().path()),
-                        scale=np.array(mesh.scale3()),
-                        X_LM=X_LW @ X_WB @ inspector.GetPoseInFrame(geometry),
-                        color=_color(inspector.GetIllustrationProperties(geometry)),
-                    )
-                )
-    return meshes
-
-
-def _carrier(
-    plant: MultibodyPlant,
-    body: BodyIndex,
-    parents: Mapping[BodyIndex, BodyIndex],
-    known: Collection[str],
-) -> str:
-    """Returns the name of a body, or of the nearest one below it that is known."""
-    while plant.get_body(body).name() not in known and body in parents:
-        body = parents[body]
-    name: str = plant.get_body(body).name()
-    return name
-
-
-def _color(properties: GeometryProperties | None) -> Vector | None:
-    """Returns the colour that the source paints a mesh in."""
-    if properties is None or not properties.HasProperty("phong", "diffuse"):
-        return None
-    return np.array(cast(Rgba, properties.GetProperty("phong", "diffuse")).rgba)
-
-
-def _looks_only(path: Path) -> str:
-    """Returns a description without what is to be hit: those meshes would be loaded, too."""
-    tree = ElementTree.parse(path)
-    for link in tree.iter("link"):
-        for collision in link.findall("collision"):
-            link.remove(collision)
-    return ElementTree.tostring(tree.getroot(), encoding="unicode")
-
-
-def _parse(
-    description: str, package: Path
-) -> tuple[MultibodyPlant, SceneGraph, ModelInstanceIndex]:
-    plant, scene_graph = MultibodyPlant(time_step=0.0), SceneGraph()
-    plant.RegisterAsSourceForSceneGraph(scene_graph)
-    parser = Parser(plant)
-    packages = PackageMap.MakeEmpty()
-    packages.Add(PACKAGE, package)
-    parser.package_map().Remove(PACKAGE)
-    parser.package_map().AddMap(packages)
-    with _quiet():
-        (pr2,) = parser.AddModelsFromString(description, "urdf")
-        plant.Finalize()
-    return plant, scene_graph, pr2
-
-
-def _own_links() -> set[str]:
-    """Returns the links of our model that can be seen."""
-    plant, scene_graph = MultibodyPlant(time_step=0.0), SceneGraph()
-    plant.RegisterAsSourceForSceneGraph(scene_graph)
-    pr2 = add_pr2(plant)
-    inspector = scene_graph.model_inspector()
-    return {
-        plant.get_body(index).name()
-        for index in plant.GetBodyIndices(pr2)
-        if inspector.GetGeometries(plant.GetBodyFrameIdOrThrow(index), Role.kIllustration)
-    }
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Keeps Drake's remarks on tags that it does not read off the terminal."""
+    source, source_graph = MultibodyPlant(time_step=0.0), SceneGraph()
+    source.RegisterAsSourceForSceneGraph(source_graph)
     logger = logging.getLogger("drake")
     level = logger.level
-    logger.setLevel(logging.CRITICAL)
+    logger.setLevel(logging.CRITICAL)  # Drake warns of tags that it ignores.
     try:
-        yield
+        _parse(source, path, package)
+        files = _move_meshes(scene, source, source_graph)
+    except RuntimeError as error:
+        reason = " ".join(str(error).split())
+        raise ModelError(f"the PR2's meshes cannot be read from {path}: {reason}") from None
     finally:
         logger.setLevel(level)
+    if not files:
+        raise ModelError(f"{path} has no mesh for any link of models/pr2/pr2.urdf")
+    return files
+
+
+def _parse(plant: MultibodyPlant, path: Path, package: Path) -> None:
+    packages = PackageMap.MakeEmpty()
+    packages.Add(PACKAGE, str(package))
+    parser = Parser(plant)
+    parser.package_map().Remove(PACKAGE)
+    parser.package_map().AddMap(packages)
+    parser.AddModels(str(path))
+    plant.Finalize()
+
+
+def _move_meshes(scene: Scene, source: MultibodyPlant, source_graph: SceneGraph) -> list[Path]:
+    """Puts the meshes of a plant on the visible links of the scene's robot; returns their files."""
+    context, inspector = source.CreateDefaultContext(), source_graph.model_inspector()
+    joints = [source.get_joint(index) for index in source.GetJointIndices()]
+    parents = {joint.child_body().name(): joint.parent_body().name() for joint in joints}
+    frames = _visible_links(scene)
+    files: list[tuple[str, Path]] = []
+    for name in parents:
+        link = name  # The nearest link towards the base that the scene's robot has, too.
+        while link not in (*frames, *_HEAD_PARTS) and link in parents:
+            link = parents[link]
+        link, frame = ("head", "torso_lift_link") if link in _HEAD_PARTS else (link, link)
+        if link not in frames:
+            continue
+        body = source.GetBodyByName(name)
+        X_WL = source.EvalBodyPoseInWorld(context, source.GetBodyByName(frame))
+        X_LB = X_WL.inverse() @ source.EvalBodyPoseInWorld(context, body)
+        for geometry in source.GetVisualGeometriesForBody(body):
+            mesh = inspector.GetShape(geometry)
+            if isinstance(mesh, Mesh):  # Boxes of the source mark frames.
+                X_LM = X_LB @ inspector.GetPoseInFrame(geometry)
+                color = _color(inspector.GetIllustrationProperties(geometry))
+                if link not in {used for used, _ in files}:
+                    _hide(scene, frames[link])
+                _attach(
+                    scene, frames[link], GeometryInstance(X_LM, mesh, f"mesh{len(files)}"), color
+                )
+                files.append((link, Path(mesh.source().path())))
+    return [path for _, path in files]
+
+
+def _visible_links(scene: Scene) -> dict[str, FrameId]:
+    """Returns the frames of the robot's links that have visual shapes, by name."""
+    inspector, plant = scene.scene_graph.model_inspector(), scene.plant
+    bodies = [plant.get_body(index) for index in plant.GetBodyIndices(scene.arm)]
+    frames = {body.name(): plant.GetBodyFrameIdOrThrow(body.index()) for body in bodies}
+    return {
+        name: frame
+        for name, frame in frames.items()
+        if inspector.GetGeometries(frame, Role.kIllustration)
+    }
+
+
+def _color(properties: GeometryProperties | None) -> Rgba | None:
+    """Returns the colour in which a mesh is painted, None if its file has colours of its own."""
+    if properties is None or not properties.HasProperty("phong", "diffuse"):
+        return None
+    return cast(Rgba, properties.GetProperty("phong", "diffuse"))
+
+
+def _hide(scene: Scene, frame: FrameId) -> None:
+    """Takes a link's own shapes out of pictures."""
+    source_id = scene.plant.get_source_id()
+    assert source_id is not None
+    for role in (Role.kIllustration, Role.kPerception):
+        scene.scene_graph.RemoveRole(source_id, frame, role)
+
+
+def _attach(scene: Scene, frame: FrameId, instance: GeometryInstance, color: Rgba | None) -> None:
+    source_id = scene.plant.get_source_id()
+    assert source_id is not None
+    geometry = scene.scene_graph.RegisterGeometry(source_id, frame, instance)
+    seen, rendered = IllustrationProperties(), PerceptionProperties()
+    rendered.AddProperty("label", "id", RenderLabel.kDontCare)
+    for properties in (seen, rendered):
+        if color is not None:
+            properties.AddProperty("phong", "diffuse", color)
+        scene.scene_graph.AssignRole(source_id, geometry, properties)

@@ -5,70 +5,147 @@ import math
 from pathlib import Path
 
 import numpy as np
-from pydrake.geometry import Cylinder, Meshcat, MeshcatParams, Rgba, Sphere
+from pydrake.geometry import (
+    Cylinder,
+    Meshcat,
+    MeshcatParams,
+    MeshcatVisualizer,
+    MeshcatVisualizerParams,
+    Rgba,
+    Role,
+    Sphere,
+)
 from pydrake.math import RigidTransform
+from pydrake.multibody.meshcat import ContactVisualizer, ContactVisualizerParams
+from pydrake.systems.framework import DiagramBuilder
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import LicError
-from lic_drake.reach.diagram import make_reach_diagram
 from lic_drake.reach.scenario import Scenario
-from lic_drake.reach.simulation import Simulation
 from lic_drake.reach.trace import ReachTrace
+from lic_drake.show.approach import Approach
+from lic_drake.show.page import embed
+from lic_drake.show.stage import Stage, in_plane, place
 from lic_drake.types import Vector
 
 PAUSE_S = 1.0
-"""Time between two reaches of a recording, at least."""
+"""Least time between two reaches, seconds."""
 
 TICKS_PER_FRAME = 10
-"""Meshcat rounds a frame's time down to ticks; with one a frame, some fell on the one before."""
+"""Meshcat rounds times down to ticks; with one tick a frame, some frames would coincide."""
 
 MAX_FRAMES_PER_SECOND = 30.0
-"""A recording has no more frames a second."""
+"""Largest frame rate."""
 
-_CAMERA_PLANE = (np.array([-0.4, -0.3, 1.05]), np.array([0.45, 0.02, 0.0]))
-"""Where the camera is, and what it looks at: an arm on the ground."""
-_CAMERA_SPACE = (np.array([-0.45, -1.65, 1.65]), np.array([0.4, -0.15, 0.85]))
-"""The same for a robot before its clutter."""
+MOVE_S = 1.0
+"""Least duration of a move of base, torso or arm between reaches, seconds."""
 
+ARM_RAD_PER_S = 1.2
+"""Average speed of the arm's fastest joint between reaches."""
 
-def in_plane(scenario: Scenario) -> bool:
-    """Tells whether the robot is an arm in the plane."""
-    return scenario.arm().surface is None
+RETRACT_SPEED = 4.0
+"""Playback speed of the arm's retraction, relative to the reach."""
 
-
-def frame_rate(control_rate_hz: float) -> float:
-    """Returns the frames per second of a recording: the control rate, halved while too high.
-
-    Frames show the samples of a reach, every one or every second, fourth and so on.
-    """
-    rate = control_rate_hz
-    while rate > MAX_FRAMES_PER_SECOND:
-        rate /= 2.0
-    return rate
+_FORCES = "/drake/contact_forces"
+_PLANE_VIEW = (np.array([-0.4, -0.3, 1.05]), np.array([0.45, 0.02, 0.0]))
+_SPACE_VIEW = (np.array([-0.45, -1.65, 1.65]), np.array([0.4, -0.15, 0.85]))
+_TASK_COLOR = Rgba(0.0, 0.7, 0.8, 0.9)
 
 
-class MeshcatRecording:
-    """A Meshcat scene that is recorded frame by frame and saved as one file.
+class Recording:
+    """A Meshcat scene of one environment in which reaches are recorded one after another.
 
-    Must be used from the thread that made it.
-
-    Args:
-        scenario: Gives the control rate and the goal's size.
+    Reaches are simulated beforehand with their states kept, and drawn here. Moves between reaches
+    are drawn, not simulated. Must be used from the thread that made it.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
-        self._scenario = scenario
+    def __init__(
+        self,
+        scenario: Scenario,
+        instance: ClutterInstance,
+        drake_models: Path | None = None,
+        approach: Approach | None = None,
+    ) -> None:
+        """Starts a recording.
+
+        Args:
+            scenario: Robot, task and control rate.
+            instance: The environment.
+            drake_models: Folder of package://drake_models, to show a PR2 in its meshes.
+            approach: How the arm moves between its waiting posture and its starts; the recording
+                begins in that posture. By default it moves on straight lines.
+        """
+        self._scenario, self._approach = scenario, approach
         self._meshcat = _make_meshcat()
-        self._frames_per_second = frame_rate(scenario.mpc.rate_hz)
-        self._meshcat.SetProperty("/Background/<object>", "top_color", [0.97, 0.97, 0.98])
-        self._meshcat.SetProperty("/Background/<object>", "bottom_color", [0.97, 0.97, 0.98])
-        self._meshcat.SetProperty("/Grid", "visible", False)
-        self._meshcat.SetProperty("/Axes", "visible", False)
-        self._meshcat.SetCameraPose(*(_CAMERA_PLANE if in_plane(scenario) else _CAMERA_SPACE))
-        self._meshcat.StartRecording(
-            TICKS_PER_FRAME * self._frames_per_second, set_visualizations_while_recording=False
+        builder = DiagramBuilder()
+        self._stage = Stage(builder, scenario, instance, drake_models)
+        scene = self._stage.scene
+        MeshcatVisualizer.AddToBuilder(
+            builder,
+            scene.scene_graph,
+            self._meshcat,
+            MeshcatVisualizerParams(role=Role.kIllustration),
         )
+        ContactVisualizer.AddToBuilder(
+            builder,
+            scene.plant,
+            self._meshcat,
+            ContactVisualizerParams(newtons_per_meter=50.0, force_threshold=0.05, radius=0.003),
+        )
+        self._diagram = builder.Build()
+        self._context = self._diagram.CreateDefaultContext()
+        self._frames_per_second = frame_rate(scenario.mpc.rate_hz)
+        self._springs_back = instance.stems is not None
         self._clock_s = 0.0
+        self._b0 = np.array([0.0, 0.0, scenario.task.torso_m])
+        initial = scene.plant.GetDefaultPositions(scene.arm)
+        self._q: Vector = initial if approach is None else approach.waiting
+        self._set_up_view()
+        if approach is not None:
+            self._draw()
+
+    def add_reach(self, trace: ReachTrace, p_WG: Vector, b0: Vector | None = None) -> None:
+        """Records a reach.
+
+        Args:
+            trace: Its samples with their states.
+            p_WG: Its goal, shape (3,), metres.
+            b0: Base position and torso height, shape (3,), metres; by default where the trace has
+                the base, and the torso at the height of the scenario's task.
+        """
+        self._draw_goal(p_WG)
+        self._show_forces(True)
+        self._b0 = np.array([*trace.p_WR[:2], self._scenario.task.torso_m]) if b0 is None else b0
+        begin = self._clock_s
+        for k in range(0, len(trace.states), self._sample_step()):
+            self._clock_s = begin + trace.time_s[k]
+            self._draw(trace, k)
+        if trace.time_s:
+            self._clock_s = begin + math.ceil(trace.time_s[-1] + PAUSE_S)
+
+    def move_to(self, b0: Vector, q: Vector) -> None:
+        """Records base, torso and arm moving to a start, in that order.
+
+        Args:
+            b0: Base position and torso height, shape (3,), metres.
+            q: Joint angles, shape (m,), radians.
+        """
+        for next_b0 in (np.array([*b0[:2], self._b0[2]]), b0):
+            self._follow(next_b0, self._q[None])
+        self._follow(b0, q[None] if self._approach is None else self._approach.path(b0, q))
+
+    def retract(self, trace: ReachTrace) -> None:
+        """Records the arm going back the way it came, and to its waiting posture.
+
+        Stems spring back with it, as they do once nothing holds them.
+        """
+        self._show_forces(False)
+        step = round(RETRACT_SPEED * self._sample_step())
+        for k in [*range(len(trace.states) - 1, -1, -step), 0]:
+            self._draw(trace, k, with_clutter=self._springs_back)
+            self._clock_s += 1.0 / self._frames_per_second
+        if self._approach is not None:
+            self._follow(self._b0, self._approach.path(self._b0, self._q)[::-1])
 
     def save(self, path: Path) -> None:
         """Writes the recording.
@@ -76,62 +153,74 @@ class MeshcatRecording:
         Raises:
             LicError: The file cannot be written.
         """
-        self._meshcat.StopRecording()
-        self._meshcat.PublishRecording()
         try:
-            path.write_text(self._meshcat.StaticHtml(), encoding="utf-8")
+            path.write_text(self.html(), encoding="utf-8")
         except OSError as error:
             raise LicError(f"cannot write {path}: {error.strerror}") from None
 
-    def _sample_steps(self) -> int:
-        """Returns how many samples of a reach there are for each frame."""
+    def _repr_html_(self) -> str:
+        """Returns the recording in a frame; notebooks call this."""
+        return embed(self.html())
+
+    def html(self) -> str:
+        """Returns the recording as a page."""
+        self._meshcat.StopRecording()
+        self._meshcat.PublishRecording()
+        return str(self._meshcat.StaticHtml())
+
+    def _sample_step(self) -> int:
+        """Returns the number of samples of a reach per frame."""
         return round(self._scenario.mpc.rate_hz / self._frames_per_second)
+
+    def _follow(self, b0: Vector, path: Vector) -> None:
+        """Records a move of base and torso to b0 and of the arm along a path; none if it is there.
+
+        Each takes at least `MOVE_S` and is slow at its ends.
+        """
+        old_b0 = self._b0
+        path = np.vstack([self._q, path])
+        passed = np.append(0.0, np.cumsum(np.abs(np.diff(path, axis=0)).max(axis=1)))
+        if np.allclose(b0, old_b0) and passed[-1] < 1e-6:
+            return
+        frames = round(max(MOVE_S, passed[-1] / ARM_RAD_PER_S) * self._frames_per_second)
+        for share in 0.5 - 0.5 * np.cos(np.pi * np.arange(1, frames + 1) / frames):
+            self._b0 = old_b0 + share * (b0 - old_b0)
+            self._q = np.array([np.interp(share * passed[-1], passed, angle) for angle in path.T])
+            self._draw()
+            self._clock_s += 1.0 / self._frames_per_second
+
+    def _draw(self, trace: ReachTrace | None = None, k: int = 0, with_clutter: bool = True) -> None:
+        """Draws the robot as it is, or a sample of a reach, at the present time."""
+        state = None if trace is None else trace.states[k]
+        if state is not None:
+            self._q = state.q
+        shown = state if with_clutter else None
+        place(self._stage.scene, self._context, self._b0, self._q, shown)
+        self._context.SetTime(self._clock_s)
+        self._diagram.ForcedPublish(self._context)
+
+    def _show_forces(self, visible: bool) -> None:
+        """Shows or hides contact forces from now on: between reaches nothing is simulated."""
+        self._meshcat.SetProperty(_FORCES, "visible", visible, self._clock_s)
+
+    def _set_up_view(self) -> None:
+        planar = in_plane(self._scenario)
+        for end in ("top_color", "bottom_color"):
+            self._meshcat.SetProperty("/Background/<object>", end, [0.97, 0.97, 0.98])
+        for hidden in ("/Grid", "/Axes"):
+            self._meshcat.SetProperty(hidden, "visible", False)
+        self._meshcat.SetCameraPose(*(_PLANE_VIEW if planar else _SPACE_VIEW))
+        self._meshcat.StartRecording(
+            TICKS_PER_FRAME * self._frames_per_second, set_visualizations_while_recording=False
+        )
+        if planar:
+            self._draw_start_line()
 
     def _draw_goal(self, p_WG: Vector) -> None:
         radius = self._scenario.stop.success_distance_m
-        self._meshcat.SetObject("/task/goal", Sphere(radius), Rgba(0.0, 0.7, 0.8, 0.9))
-        self._meshcat.SetTransform("/task/goal", RigidTransform(p_WG))
-        self._meshcat.SetObject("/task/pole", Cylinder(0.002, 0.3), Rgba(0.0, 0.7, 0.8, 0.9))
-        self._meshcat.SetTransform("/task/pole", RigidTransform(p_WG))
-
-
-class ReachRecording(MeshcatRecording):
-    """A Meshcat scene of one environment in which reaches are recorded one after another.
-
-    A reach is simulated first, as anywhere else but with its states kept, and its samples are
-    drawn afterwards.
-
-    Args:
-        scenario: Robot, task and control rate.
-        instance: The environment.
-        torso_m: Height of the robot's torso, metres; by default as the scenario's task has it.
-    """
-
-    def __init__(
-        self, scenario: Scenario, instance: ClutterInstance, torso_m: float | None = None
-    ) -> None:
-        super().__init__(scenario)
-        diagram = make_reach_diagram(
-            scenario, instance, self._meshcat, base_slides=True, torso_m=torso_m
-        )
-        self._drawing = Simulation(diagram, scenario.scene)
-        if in_plane(scenario):
-            self._draw_start_line()
-
-    def add_reach(self, trace: ReachTrace, p_WG: Vector) -> None:
-        """Records a reach.
-
-        Args:
-            trace: Its samples with their states.
-            p_WG: Its goal, shape (3,), metres.
-        """
-        self._draw_goal(p_WG)
-        self._drawing.set_base(trace.p_WR)
-        for k in range(0, len(trace.states), self._sample_steps()):
-            self._drawing.set_state(trace.states[k])
-            self._drawing.publish(self._clock_s + trace.time_s[k])
-        if trace.time_s:
-            self._clock_s += math.ceil(trace.time_s[-1] + PAUSE_S)
+        for name, shape in (("goal", Sphere(radius)), ("pole", Cylinder(0.002, 0.3))):
+            self._meshcat.SetObject(f"/task/{name}", shape, _TASK_COLOR)
+            self._meshcat.SetTransform(f"/task/{name}", RigidTransform(p_WG))
 
     def _draw_start_line(self) -> None:
         """Draws where the hand may start, green, or, with a mobile base, where that may, blue."""
@@ -144,8 +233,16 @@ class ReachRecording(MeshcatRecording):
             self._meshcat.SetLine("/task/base_track", ends.T, 3.0, Rgba(0.1, 0.3, 0.8, 1.0))
 
 
+def frame_rate(control_rate_hz: float) -> float:
+    """Returns the frames per second of a recording: the control rate, halved while too high."""
+    rate = control_rate_hz
+    while rate > MAX_FRAMES_PER_SECOND:
+        rate /= 2.0
+    return rate
+
+
 def _make_meshcat() -> Meshcat:
-    """Returns a Meshcat without the message that tells where to look at it live."""
+    """Returns a Meshcat without logging the address of its live view."""
     logger = logging.getLogger("drake")
     level = logger.level
     logger.setLevel(logging.WARNING)

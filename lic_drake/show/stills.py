@@ -1,130 +1,246 @@
-"""Stills of a demonstration: where each attempt began, where it pushed hardest, where it ended."""
+"""Rendered stills of attempts: their start, the moment of the hardest push, and their end."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple, cast
 
 import numpy as np
 from matplotlib.figure import Figure
+from pydrake.geometry import Box, LightParameter, Sphere
+from pydrake.multibody.plant import ContactResults
+from pydrake.systems.framework import DiagramBuilder
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import RenderingError
-from lic_drake.evaluate.trial import Attempt
+from lic_drake.perception.cameras import (
+    RENDERER,
+    add_camera,
+    add_prop,
+    look_at,
+    make_renderer,
+    take_color_image,
+)
+from lic_drake.perception.config import CameraConfig
+from lic_drake.perception.image import CameraImage
 from lic_drake.reach.scenario import Scenario
-from lic_drake.reach.trace import ReachTrace
-from lic_drake.show.photographs import HEIGHT, WIDTH, Photograph, Photographer, View
-from lic_drake.show.plots import save_figure
-from lic_drake.show.pr2_meshes import LinkMesh
+from lic_drake.reach.trace import SceneState
+from lic_drake.show.detections import draw_image
+from lic_drake.show.figures import ShownTrial, save_figure
+from lic_drake.show.stage import Stage, in_plane, place
 from lic_drake.types import Vector
 
-PLANAR_VIEWS = {"": View((-0.45, -0.62, 0.95), (0.46, 0.0, -0.08))}
-"""From behind and above, to the right."""
+CAMERA = CameraConfig(width=1280, height=960, focal_px=1100.0)
+"""The camera."""
 
-PR2_VIEWS = {
-    "": View((-0.75, -2.25, 1.75), (0.22, -0.05, 0.78)),
-    "inside": View((1.8, -1.0, 1.75), (0.55, -0.12, 1.0)),
-}
-"""Robot, board and clutter from the right; the clutter from behind the board."""
+GOAL_COLOR = np.array([0.0, 0.65, 0.8, 1.0])
+"""Colour of the goal, RGBA."""
+FLOOR_COLOR = np.array([0.74, 0.74, 0.76, 1.0])
+"""Colour of the floor, RGBA."""
 
 NEWTONS_PER_METRE = 20.0
 """Scale of the arrows that stand for forces."""
 
 LONGEST_ARROW_M = 0.3
-"""Arrows of larger forces are no longer; the words say how large they are."""
+"""Length of the arrows of larger forces, whose size the caption gives."""
 
 LEAST_FORCE_N = 0.05
 """Smaller forces are not drawn."""
 
+# Cylinders of the plane stand with their middle at z = 0.
+_FLOOR_IN_PLANE_M = -0.13
+
+
+class View(NamedTuple):
+    """Position and target of a camera, (x, y, z), metres."""
+
+    p_WC: tuple[float, float, float]
+    target: tuple[float, float, float]
+
+
+PLANAR_VIEWS = {"": View((-0.45, -0.62, 0.95), (0.46, 0.0, -0.08))}
+"""From behind and above, to the right."""
+
+SPATIAL_VIEWS = {
+    "": View((-0.75, -2.25, 1.75), (0.22, -0.05, 0.78)),
+    "inside": View((1.8, -1.0, 1.75), (0.55, -0.12, 1.0)),
+}
+"""Robot, board and clutter from the right; the clutter from behind the board."""
+
+
+class Still(NamedTuple):
+    """An image and the contact forces at that moment.
+
+    Attributes:
+        image: Colours only.
+        p_WC: Points of application, shape (n, 3), metres.
+        f_W: Forces on the arm, shape (n, 3), N.
+    """
+
+    image: CameraImage
+    p_WC: Vector
+    f_W: Vector
+
+
+class StillCamera:
+    """Renders states of one environment that were simulated before."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        instance: ClutterInstance,
+        p_WG: Vector,
+        drake_models: Path | None = None,
+    ) -> None:
+        """Builds the scene.
+
+        Args:
+            scenario: Robot and contact.
+            instance: The environment.
+            p_WG: The goal, shape (3,), metres.
+            drake_models: Folder of package://drake_models, to show a PR2 in its meshes.
+
+        Raises:
+            RenderingError: The renderer does not work on this machine, or not with these meshes.
+        """
+        make_renderer()  # Whether it works at all, before anything is built.
+        builder = DiagramBuilder()
+        self._stage = Stage(builder, scenario, instance, drake_models)
+        scene_graph = self._stage.scene.scene_graph
+        has_gltf = any(path.suffix == ".gltf" for path in self._stage.meshes)
+        try:
+            scene_graph.AddRenderer(RENDERER, make_renderer(_lamps(has_gltf)))
+        except RuntimeError as error:  # It loads the meshes now.
+            raise RenderingError(f"a mesh cannot be rendered: {error}") from None
+        floor_m = _FLOOR_IN_PLANE_M if in_plane(scenario) else 0.0
+        p_WF = np.array([0.0, 0.0, floor_m - 0.01])
+        add_prop(scene_graph, "floor", Box(12.0, 12.0, 0.02), p_WF, FLOOR_COLOR)
+        radius = scenario.stop.success_distance_m
+        add_prop(scene_graph, "goal", Sphere(radius), p_WG, GOAL_COLOR)
+        self.views = PLANAR_VIEWS if in_plane(scenario) else SPATIAL_VIEWS
+        self._sensors = {
+            name: add_camera(builder, scene_graph, f"{name}_camera", CAMERA, look_at(*view))
+            for name, view in self.views.items()
+        }
+        self._diagram = builder.Build()
+        self._context = self._diagram.CreateDefaultContext()
+
+    def take(self, view: str, b0: Vector, state: SceneState) -> Still:
+        """Returns a still.
+
+        Args:
+            view: One of the names in `views`.
+            b0: Base position and torso height, shape (3,), metres.
+            state: State of arm and clutter.
+        """
+        place(self._stage.scene, self._context, b0, state.q, state)
+        X_WC = look_at(*self.views[view])
+        image = CameraImage(
+            color=take_color_image(self._sensors[view], self._context),
+            depth=np.full((CAMERA.height, CAMERA.width), np.nan),
+            focal_px=CAMERA.focal_px,
+            R_WC=np.array(X_WC.rotation().matrix()),
+            p_WC=np.array(X_WC.translation()),
+        )
+        return Still(image, *self._forces())
+
+    def _forces(self) -> tuple[Vector, Vector]:
+        """Returns points of application of the forces on the skin, and the forces."""
+        plant, skin = self._stage.scene.plant, self._stage.scene.skin_links
+        port = plant.get_contact_results_output_port()
+        results = cast(ContactResults, port.Eval(plant.GetMyContextFromRoot(self._context)))
+        contacts = []  # The two geometries, the point, and the force on the first one.
+        for i in range(results.num_hydroelastic_contacts()):
+            patch = results.hydroelastic_contact_info(i)
+            surface, force = patch.contact_surface(), patch.F_Ac_W().translational()
+            contacts.append((surface.id_M(), surface.id_N(), surface.centroid(), force))
+        for i in range(results.num_point_pair_contacts()):
+            pair = results.point_pair_contact_info(i)
+            ids, force = pair.point_pair(), pair.contact_force()
+            contacts.append((ids.id_B, ids.id_A, pair.contact_point(), force))
+        on_skin = [c for c in contacts if c[0] in skin or c[1] in skin]
+        forces = [force if first in skin else -force for first, _, _, force in on_skin]
+        return np.reshape([c[2] for c in on_skin], (-1, 3)), np.reshape(forces, (-1, 3))
+
 
 def save_stills(
-    scenario: Scenario,
-    instance: ClutterInstance,
-    p_WG: Vector,
-    done: Sequence[Attempt],
-    traces: Sequence[ReachTrace],
+    trial: ShownTrial,
     out: Path,
     say: Callable[[str], None],
-    meshes: Sequence[LinkMesh] = (),
+    drake_models: Path | None = None,
 ) -> dict[str, Path]:
-    """Writes attempt1_start.png, attempt1_middle.png and attempt1_end.png, and so on.
+    """Writes attempt1_start.png, attempt1_middle.png, attempt1_end.png and so on.
 
-    For a robot in space attempt1_inside.png shows the end from behind the board. Stills of an
-    earlier demonstration in the folder are removed. Without a renderer there are none.
+    For a robot in space attempt1_inside.png shows the end from behind the board.
 
     Args:
-        scenario: Robot and contact.
-        instance: The environment.
-        p_WG: The goal, shape (3,), metres.
-        done: The attempts in their order.
-        traces: Their samples with their states.
+        trial: What to show.
         out: The folder.
-        say: Gets a line if stills cannot be rendered.
-        meshes: What a PR2 wears instead of the shapes of its model.
+        say: Gets a line if stills cannot be rendered; there are none then.
+        drake_models: Folder of package://drake_models, to show a PR2 in its meshes.
 
     Returns:
-        The files by their kind.
+        The files by kind.
 
     Raises:
         LicError: A file cannot be written.
     """
-    for name in ("start", "middle", "end", "inside"):
-        for old in out.glob(f"attempt[1-9]_{name}.png"):
-            old.unlink()
-    views = PLANAR_VIEWS if scenario.arm().surface is None else PR2_VIEWS
     try:
-        photographer = Photographer(scenario, instance, p_WG, views, meshes)
+        camera = StillCamera(trial.scenario, trial.instance, trial.p_WG, drake_models)
     except RenderingError as error:
         say(f"no stills: {error}")
         return {}
     files = {}
-    for number, (attempt, trace) in enumerate(zip(done, traces, strict=True), start=1):
+    for number, (attempt, trace) in enumerate(trial, start=1):
         if not trace.states:
             continue
-        b0 = attempt.request.start.b0
         last = len(trace.states) - 1
         hardest = int(np.argmax(trace.total_force)) if any(trace.contacts) else last // 2
-        moments = {"start": 0, "middle": hardest, "end": last}
-        shots = [(name, "", k) for name, k in moments.items()]
-        shots += [(view, view, last) for view in views if view]
+        shots = [("start", "", 0), ("middle", "", hardest), ("end", "", last)]
+        shots += [(view, view, last) for view in camera.views if view]
         for name, view, k in shots:
-            photograph = photographer.take(view, b0, trace.states[k])
-            words = f"attempt {number}, {trace.time_s[k]:.1f} s"
-            if k == last:
-                words += f": {attempt.record.outcome}"
+            still = camera.take(view, attempt.request.start.b0, trace.states[k])
+            caption = f"attempt {number}, {trace.time_s[k]:.1f} s"
+            caption += f": {attempt.record.outcome}" if k == last else ""
             path = out / f"attempt{number}_{name}.png"
-            save_figure(draw_photograph(photograph, words), path, margins=False)
+            save_figure(draw_still(still, caption), path, margins=False)
             files[f"attempt {number} {name}"] = path
     return files
 
 
-def draw_photograph(photograph: Photograph, words: str) -> Figure:
-    """Returns a photograph with the forces on the arm and a line of words.
-
-    Args:
-        photograph: What to draw.
-        words: What is said of it.
-    """
-    image = photograph.image
-    figure = Figure(figsize=(0.005 * WIDTH, 0.005 * HEIGHT))
-    ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    ax.imshow(image.color)
-    ax.set(xlim=(-0.5, WIDTH - 0.5), ylim=(HEIGHT - 0.5, -0.5))
-    ax.set_axis_off()
-    strength = np.linalg.norm(photograph.f_W, axis=1)
+def draw_still(still: Still, caption: str) -> Figure:
+    """Returns a still with arrows for the forces on the arm, and a caption."""
+    image = still.image
+    height, width = image.shape
+    figure = Figure(figsize=(0.005 * width, 0.005 * height))
+    ax = draw_image(figure.add_axes((0.0, 0.0, 1.0, 1.0)), image)
+    strength = np.linalg.norm(still.f_W, axis=1)
     shown = strength > LEAST_FORCE_N
     length = np.minimum(strength[shown] / NEWTONS_PER_METRE, LONGEST_ARROW_M)
-    arrows = photograph.f_W[shown] * (length / strength[shown])[:, np.newaxis]
-    tails = image.project(photograph.p_WC[shown])
-    heads = image.project(photograph.p_WC[shown] + arrows)
+    arrows = still.f_W[shown] * (length / strength[shown])[:, np.newaxis]
+    tails = image.project(still.p_WC[shown])
+    heads = image.project(still.p_WC[shown] + arrows)
+    style = {"arrowstyle": "-|>", "color": "crimson", "lw": 1.8, "shrinkA": 0}
     for tail, head in zip(tails, heads, strict=True):
-        ax.annotate(
-            "",
-            xy=(head[0], head[1]),
-            xytext=(tail[0], tail[1]),
-            annotation_clip=False,
-            arrowprops={"arrowstyle": "-|>", "color": "crimson", "lw": 1.8, "shrinkA": 0},
-        )
+        ax.annotate("", xy=head, xytext=tail, annotation_clip=False, arrowprops=style)
     if np.any(shown):
-        words += f"; forces on the arm up to {strength.max():.1f} N"
+        caption += f"; forces on the arm up to {strength.max():.1f} N"
     paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7}
-    ax.text(30, 45, words, fontsize=9, color="0.15", bbox=paper)
+    ax.text(30, 45, caption, fontsize=9, color="0.15", bbox=paper)
     return figure
+
+
+def _lamps(physical: bool) -> list[LightParameter]:
+    """Returns a lamp behind and above the robot, and one at the camera.
+
+    Args:
+        physical: Whether a mesh has materials for which VTK computes light physically, which needs
+            stronger lamps.
+    """
+    strength = 2.5 if physical else 1.0
+    return [
+        LightParameter(type="directional", frame=frame, direction=direction, intensity=intensity)
+        for frame, direction, intensity in (
+            ("world", [0.5, 0.5, -1.0], 0.65 * strength),
+            ("camera", [0.0, 0.0, 1.0], 0.75 * strength),
+        )
+    ]

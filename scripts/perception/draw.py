@@ -18,8 +18,8 @@ from lic_drake.perception.noise import disturbed_views
 from lic_drake.perception.observer import board_of
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.seeds import make_generator
-from lic_drake.show.drawing import draw_apertures, draw_goal
-from lic_drake.show.plots import save_figure
+from lic_drake.show.detections import draw_apertures, draw_goal
+from lic_drake.show.figures import save_figure
 from scripts.common import make_parser, run_script
 
 

@@ -25,7 +25,7 @@ from lic_drake.experience.added import add_records
 from lic_drake.experience.added_rows import COLUMNS
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
-from lic_drake.show.plots import save_figure
+from lic_drake.show.figures import save_figure
 from scripts.common import (
     add_results,
     add_workers,

@@ -18,7 +18,7 @@ from lic_drake.evaluate.statistics import count
 from lic_drake.evaluate.tables import LEARNED, METHODS
 from lic_drake.evaluate.trials import TrialTable
 from lic_drake.reach.scenario import load_scenario
-from lic_drake.show.plots import save_figure
+from lic_drake.show.figures import save_figure
 from scripts.common import add_results, load_trials, make_parser, run_script
 from scripts.cross_validation.scores import CalibrationBin, calibration_curve
 from scripts.learning_curve.run import LearningPoint

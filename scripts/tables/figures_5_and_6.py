@@ -11,8 +11,9 @@ from lic_drake.paths import shipped_library
 from lic_drake.reach.starts import make_starts
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.registry import make_selector
-from lic_drake.show.attempt_figures import densities_figure, snapshots_figure
-from lic_drake.show.plots import save_figure
+from lic_drake.show.density import densities_figure
+from lic_drake.show.figures import save_figure
+from lic_drake.show.views import snapshots_figure
 from scripts.common import add_results, load_trials, make_parser, run_script
 
 
@@ -37,7 +38,7 @@ def main() -> None:
     folder = args.results / "figures"
     folder.mkdir(parents=True, exist_ok=True)
     save_figure(snapshots_figure(attempts), folder / f"figure_5_{args.category}.png")
-    density = densities_figure(selector, starts, p_WG, attempts)
+    density = densities_figure(selector, starts, attempts)
     save_figure(density, folder / f"figure_6_{args.category}.png")
 
 

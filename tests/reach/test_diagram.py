@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-from pydrake.geometry import Meshcat
 from pydrake.multibody.tree import JointIndex
 from pydrake.systems.analysis import Simulator
 from support.reaches import start_angles, start_context
@@ -63,7 +62,6 @@ def test_every_system_has_a_name_of_its_own(reach_diagram: ReachDiagram) -> None
     names = [system.get_name() for system in reach_diagram.diagram.GetSystems()]
     assert sorted(names) == ["controller", "plant", "scene_graph", "sensor", "standstill"]
     assert reach_diagram.diagram.get_name() == "reach"
-    assert reach_diagram.visualizer is None
 
 
 def test_all_systems_run(reach_diagram: ReachDiagram) -> None:
@@ -105,12 +103,3 @@ def test_only_movable_objects_have_joints(reach_diagram: ReachDiagram) -> None:
         for i in scene.plant.GetJointIndices(scene.clutter)
     ]
     assert joints == ["object0_x", "object0_y"]
-
-
-def test_a_visualizer_is_named_and_does_not_change_the_ports() -> None:
-    shown = make_reach_diagram(SCENARIO, CLUTTER, Meshcat())
-    assert shown.visualizer is not None
-    names = {system.get_name() for system in shown.diagram.GetSystems()}
-    assert not any("@" in name or "::" in name for name in names)
-    assert {"plant", "sensor", "controller"} < names
-    assert shown.diagram.num_output_ports() == 4

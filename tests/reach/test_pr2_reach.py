@@ -1,9 +1,6 @@
 """Reaches of the PR2: in free space, against a fixed sphere, and into 40 floating ones."""
 
-import re
-from base64 import b64decode
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,7 +19,6 @@ from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.simulation import Simulation
 from lic_drake.reach.start import Start
 from lic_drake.reach.trace import ReachResult
-from lic_drake.show.recording import ReachRecording
 
 PRECISE = load_scenario("sphere-aperture-clutter", "{stop: {success_distance_m: 0.01}}")
 FREE = Environment(PRECISE, spheres())
@@ -142,23 +138,6 @@ def test_a_collections_reaches_are_counted_where_starts_differ_from_place_to_pla
     assert collection.num_reaches(range(8)) == 12 * (7 * 20 + 19)
     assert collection.num_reaches([7]) == len(collection.reaches(7))
     assert collection.num_reaches([]) == 0
-
-
-def test_a_recording_shows_the_robot(tmp_path: Path) -> None:
-    short = load_scenario("sphere-aperture-clutter", "{stop: {timeout_s: 0.08}}")
-    instance = short.sample_instance("training", 0)
-    p_WG = short.goals("training", 0)[4]
-    start = pointing_starts(short, instance, standing_at(0.01, 0.16)).grid
-    environment = Environment(short, instance, p_WR=np.array([0.0, 0.01, 0.0]), torso_m=0.16)
-    result = environment.reach(p_WG, start.x0[7], keep_states=True)
-    assert result.outcome == "timeout"
-    recording = ReachRecording(short, instance, 0.16)
-    recording.add_reach(result.trace, p_WG)
-    recording.save(tmp_path / "pr2.html")
-    content = (tmp_path / "pr2.html").read_text(encoding="utf-8")
-    messages = b"".join(b64decode(text) for text in re.findall(r"base64,([\w+/]+=*)", content))
-    assert b"r_wrist_roll_link" in messages
-    assert b"object39" in messages
 
 
 def test_a_further_reach_finds_the_spheres_where_the_first_left_them() -> None:

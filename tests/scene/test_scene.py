@@ -5,6 +5,7 @@ from pydrake.systems.analysis import ApplySimulatorConfig, SimulatorConfig
 from pydrake.systems.framework import DiagramBuilder
 from support.worlds import ARM, box, cylinder, make_clutter, make_world
 
+from lic_drake.scene.furnish import place_robot
 from lic_drake.scene.scene import SceneConfig, add_scene, make_shape
 
 PARKED = np.deg2rad([-140.0, 100.0, 120.0])
@@ -62,20 +63,18 @@ def test_movable_objects_come_in_their_order_in_the_clutter_state() -> None:
     np.testing.assert_array_equal(world.objects, CLUTTER.p_WO[CLUTTER.movable, :2])
 
 
-def test_a_base_stands_still_at_the_origin_unless_it_slides() -> None:
-    for slides in (False, True):
+def test_a_robot_stands_at_the_origin_unless_it_is_placed() -> None:
+    for p_WR in (np.zeros(3), np.array([0.1, -0.4, 0.0])):
         builder = DiagramBuilder()
-        scene = add_scene(builder, ARM, CLUTTER, SceneConfig(), base_slides=slides)
+        placeable = bool(np.any(p_WR))
+        scene = add_scene(builder, ARM, CLUTTER, SceneConfig(), placeable=placeable)
         diagram = builder.Build()
         context = diagram.CreateDefaultContext()
         plant_context = scene.plant.GetMyMutableContextFromRoot(context)
-        assert scene.plant.num_positions(scene.base) == (2 if slides else 0)
         assert scene.plant.num_positions(scene.arm) == 3
         assert scene.plant.num_positions(scene.clutter) == 4
-        p_WR = np.zeros(2)
-        if slides:
-            p_WR = np.array([0.1, -0.4])
-            scene.plant.SetPositions(plant_context, scene.base, p_WR)
+        if placeable:
+            place_robot(scene, context, p_WR)
         q = np.deg2rad([-30.0, 60.0, 50.0])
         scene.plant.SetPositions(plant_context, scene.arm, q)
         # The arm goes along; the clutter does not.
@@ -84,9 +83,7 @@ def test_a_base_stands_still_at_the_origin_unless_it_slides() -> None:
             X_WL = scene.plant.EvalBodyPoseInWorld(
                 plant_context, scene.plant.GetBodyByName(name, scene.arm)
             )
-            np.testing.assert_allclose(
-                X_WL.translation(), p_RL[i] + np.append(p_WR, 0.0), atol=1e-12
-            )
+            np.testing.assert_allclose(X_WL.translation(), p_RL[i] + p_WR, atol=1e-12)
         np.testing.assert_array_equal(
             scene.plant.GetPositions(plant_context, scene.clutter).reshape(-1, 2),
             CLUTTER.p_WO[CLUTTER.movable, :2],

@@ -5,20 +5,20 @@ import pytest
 from support.pr2_reaches import SCENARIO
 
 from lic_drake.reach.pointing_starts import mobile_positions, pointing_starts
-from lic_drake.show.approach import RETREAT_STEP_M, WAITING_DEG, plan_approach
+from lic_drake.show.approach import RETREAT_STEP_M, WAITING_DEG, Approach
 
 INSTANCE = SCENARIO.sample_instance("training", 0)
 STARTS = pointing_starts(SCENARIO, INSTANCE)
+APPROACH = Approach(SCENARIO, INSTANCE)
 
 
-# At the last one the arm's limits allow no straight way.
+# To the last one the direct way is blocked, and the arm's limits allow no straight way.
 @pytest.mark.parametrize(("index", "straight"), [(0, True), (16, True), (9, False)])
 def test_the_arm_comes_straight_in_and_touches_nothing(index: int, straight: bool) -> None:
     b0, q_start = STARTS.grid.b0[index], STARTS.grid_angles[index]
-    path = plan_approach(STARTS.checker, b0, q_start)
-    assert path is not None
+    path = APPROACH.path(b0, q_start)
     np.testing.assert_allclose(path[[0, -1]], [np.deg2rad(WAITING_DEG), q_start])
-    arm = SCENARIO.arm(float(b0[2]))
+    arm = SCENARIO.arm()
     assert np.all((path >= arm.q_min) & (path <= arm.q_max))
     for a, b in pairwise(path):
         for q in np.linspace(a, b, 1 + int(np.ceil(np.abs(b - a).max() / 0.02))):

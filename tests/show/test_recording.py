@@ -1,36 +1,38 @@
-import base64
 import re
 import struct
+from base64 import b64decode
 from pathlib import Path
 
 import numpy as np
 import pytest
 from support.browser import assert_shows_a_scene, hue_share, visit
-from support.reaches import free_space, reach_request, small_clutter
+from support.reaches import free_space, reach_request
 from support.worlds import cylinder, make_clutter
 
 from lic_drake.errors import LicError
 from lic_drake.reach.environment import Environment
-from lic_drake.reach.rollout import run_reach, simulate_request
+from lic_drake.reach.pointing_starts import pointing_starts, standing_at
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.trace import ReachTrace
-from lic_drake.show.recording import PAUSE_S, ReachRecording, frame_rate
+from lic_drake.show.approach import Approach
+from lic_drake.show.page import embed
+from lic_drake.show.recording import MOVE_S, PAUSE_S, Recording, frame_rate
 
 TICKS_PER_SECOND = 250
 P_WG = np.array([0.6, 0.1, 0.0])
-EASY_START = reach_request(free_space()).start.x0
+EASY_START = np.array(reach_request(free_space()).start.x0)
+EASY_POSTURE = np.array([-0.6, 1.0, 0.5])
 LAST_LINK = b"/drake/visualizer/planar_arm/link3"
 
 
-def animation_of(html: str) -> bytes:
-    """The message (msgpack) with which the file sets its animation."""
-    messages = [base64.b64decode(text) for text in re.findall(r"base64,([\w+/]+=*)", html)]
-    (animation,) = [message for message in messages if b"set_animation" in message]
-    return animation
+def messages_of(html: str) -> list[bytes]:
+    """The messages (msgpack) with which the file builds its scene."""
+    return [b64decode(text) for text in re.findall(r"base64,([\w+/]+=*)", html)]
 
 
-def positions_of(animation: bytes, path: bytes) -> dict[int, np.ndarray]:
+def positions_of(html: str, path: bytes) -> dict[int, np.ndarray]:
     """Recorded positions of an object, tick -> (x, y, z), read from the msgpack bytes."""
+    (animation,) = [message for message in messages_of(html) if b"set_animation" in message]
     track = animation[animation.index(path) :]
     track = track[: track.index(b".quaternion")]
     # {"time": n, "value": [x, y, z]}: n in 1, 2 or 3 bytes, the others as doubles.
@@ -42,96 +44,81 @@ def positions_of(animation: bytes, path: bytes) -> dict[int, np.ndarray]:
 
 
 @pytest.fixture(scope="module")
-def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[ReachTrace], str]:
-    """Two short reaches, one after the other, and the file that shows them."""
-    scenario = free_space(1.0)
+def recorded() -> tuple[list[ReachTrace], str]:
+    """Three short reaches from different bases, one after the other, and their recording."""
+    scenario = free_space(0.4)
     clutter = make_clutter(cylinder(0.5, 0.35, movable=True), cylinder(0.9, 0.6))
-    recording = ReachRecording(scenario, clutter)
-    environment = Environment(scenario, clutter)
-    goals = (P_WG, P_WG * [1, -1, 1])
-    reaches = [environment.reach(p_WG, EASY_START, keep_states=True) for p_WG in goals]
-    for result, p_WG in zip(reaches, goals, strict=True):
-        recording.add_reach(result.trace, p_WG)
-    path = tmp_path_factory.mktemp("recording") / "reach.html"
-    recording.save(path)
-    assert all(outcome == "timeout" and not detail for outcome, _, detail in reaches)
-    return [trace for _, trace, _ in reaches], path.read_text(encoding="utf-8")
+    recording, traces = Recording(scenario, clutter), []
+    for base in (np.array([0.0, -0.3, 0.0]), np.zeros(3), np.array([0.05, 0.2, 0.0])):
+        environment = Environment(scenario, clutter, p_WR=base)
+        result = environment.reach(P_WG + base, EASY_START + base, keep_states=True)
+        assert (result.outcome, result.detail) == ("timeout", "")
+        recording.add_reach(result.trace, P_WG + base)
+        traces.append(result.trace)
+    return traces, recording.html()
 
 
 def test_the_frames_show_the_arm_where_it_was(recorded: tuple[list[ReachTrace], str]) -> None:
     traces, html = recorded
-    frames = positions_of(animation_of(html), LAST_LINK)
-    kinematics = free_space().arm().kinematics
-    begin = 0
+    frames = positions_of(html, LAST_LINK)
+    kinematics, begin = free_space().arm().kinematics, 0
     for trace in traces:
         # 25 samples a second and as many frames, at their tick or, by rounding, the one before.
         for k, q in enumerate(trace.q):
             tick = begin + 10 * k
             assert (tick in frames) != (tick - 1 in frames)
             frame = frames[tick] if tick in frames else frames[tick - 1]
-            np.testing.assert_allclose(frame, [*kinematics.link_origins(q)[2], 0.0], atol=1e-9)
+            expected = [*(kinematics.link_origins(q)[2] + trace.p_WR[:2]), 0.0]
+            np.testing.assert_allclose(frame, expected, atol=1e-9)
         # The next reach begins at a whole second, after a pause.
-        begin += TICKS_PER_SECOND * round(trace.time_s[-1] + PAUSE_S)
-    assert len(frames) == 2 * 26
+        begin += TICKS_PER_SECOND * int(np.ceil(trace.time_s[-1] + PAUSE_S))
+    assert len(frames) == sum(len(trace.q) for trace in traces)
 
 
-def test_it_shows_every_object(recorded: tuple[list[ReachTrace], str]) -> None:
+def test_it_shows_every_object_and_plays_offline(recorded: tuple[list[ReachTrace], str]) -> None:
     _, html = recorded
-    messages = [base64.b64decode(text) for text in re.findall(r"base64,([\w+/]+=*)", html)]
-    paths = {
-        match.decode()
-        for message in messages
-        for match in re.findall(rb"/[a-z][\w/]+", message)
-        if b"set_object" in message
-    }
+    objects = [message for message in messages_of(html) if b"set_object" in message]
+    paths = {path.decode() for m in objects for path in re.findall(rb"/[a-z][\w/]+", m)}
     assert any(path.startswith("/drake/visualizer/clutter/object0") for path in paths)
     assert any(path.endswith("surroundings/object1_visual") for path in paths)
     assert {"/task/goal", "/task/start_line"} <= paths
-
-
-def test_it_plays_offline(recorded: tuple[list[ReachTrace], str]) -> None:
-    _, html = recorded
     assert not re.search(r"<(script|link|img|iframe)[^>]*(src|href)\s*=", html)
     assert not re.search(r"@import|\bimport\s*\(?\s*['\"]http", html)
 
 
-@pytest.mark.parametrize("environment", [0, 1])
-def test_a_recorded_reach_is_the_simulated_one(environment: int) -> None:
-    scenario = small_clutter(2.5)
-    request = reach_request(scenario, (0.7, 0.0), 0.0, 90.0, environment=environment)
-    expected = run_reach(request)
-    assert expected.peak_contacts > 0
-    for _ in range(2):
-        outcome, trace, detail = simulate_request(request, keep_states=True)
-        assert (outcome, detail) == (expected.outcome, expected.detail)
-        assert trace.time_s[-1] == expected.duration_s
-        assert tuple(trace.q[-1]) == expected.q_final
-        assert max(trace.peak_force) == expected.peak_force
-        # What is drawn: the whole scene at every sample, as the rollout read it.
-        assert [tuple(state.q) for state in trace.states] == [tuple(q) for q in trace.q]
-        np.testing.assert_array_equal(trace.states[-1].p_WO, trace.p_WO)
+def test_the_robot_moves_base_torso_and_arm_in_that_order_and_the_arm_goes_back() -> None:
+    scenario = load_scenario("sphere-aperture-clutter", "{stop: {timeout_s: 0.4}}")
+    instance = scenario.sample_instance("training", 0)
+    starts = pointing_starts(scenario, instance, standing_at(0.05, 0.2))
+    b0, q, x0 = starts.grid.b0[7], starts.grid_angles[7], starts.grid.x0[7]
+    p_WG = scenario.goals("training", 0)[4]
+    environment = Environment(scenario, instance, p_WR=np.array([0.0, 0.05, 0.0]), torso_m=0.2)
+    result = environment.reach(p_WG, x0, keep_states=True)
+    assert result.outcome == "timeout"
 
-
-def test_a_base_aside_carries_the_arm_in_the_recording(tmp_path: Path) -> None:
-    scenario = free_space(0.2)
-    clutter = make_clutter(cylinder(0.5, 0.35, movable=True))
-    recording, begin = ReachRecording(scenario, clutter), 0
-    kinematics, expected = scenario.arm().kinematics, {}
-    # The base stands elsewhere in each reach of a recording.
-    for base in (np.array([0.0, -0.3, 0.0]), np.zeros(3), np.array([0.05, 0.2, 0.0])):
-        environment = Environment(scenario, clutter, p_WR=base)
-        trace = environment.reach(P_WG + base, EASY_START + base, keep_states=True).trace
-        recording.add_reach(trace, P_WG + base)
-        for k, q in enumerate(trace.q):
-            expected[begin + 10 * k] = base[:2] + kinematics.link_origins(q)[2]
-        begin += TICKS_PER_SECOND * 2
-    recording.save(tmp_path / "reach.html")
-    html = (tmp_path / "reach.html").read_text(encoding="utf-8")
-    frames = positions_of(animation_of(html), LAST_LINK)
-    assert len(frames) == len(expected)
-    for tick, position in expected.items():
-        frame = frames[tick] if tick in frames else frames[tick - 1]
-        np.testing.assert_allclose(frame, [*position, 0.0], atol=1e-9)
+    recording = Recording(scenario, instance, approach=Approach(scenario, instance))
+    recording.move_to(b0, q)
+    recording.add_reach(result.trace, p_WG, b0)
+    recording.retract(result.trace)
+    html = recording.html()
+    base, torso, wrist = (
+        positions_of(html, b"/drake/visualizer/pr2/" + link)
+        for link in (b"base_link", b"torso_lift_link", b"r_wrist_roll_link")
+    )
+    end = round(MOVE_S * TICKS_PER_SECOND)
+    p_WB = np.array(list(base.values()))[:, :2]
+    np.testing.assert_allclose(p_WB[0], p_WB[-1] - [0.0, 0.05], atol=1e-3)
+    # Base: the first second. Torso: the second one. Then the arm, which ends where it began.
+    assert max(tick for tick in base if base[tick][1] < base[max(base)][1] - 1e-9) <= end
+    rising = [tick for tick in torso if torso[tick][2] < torso[max(torso)][2] - 1e-9]
+    assert end < max(rising) <= 2 * end
+    offset = {tick: wrist[tick] - torso[tick] for tick in wrist}
+    moving = [t for t in offset if np.linalg.norm(offset[t] - offset[min(offset)]) > 1e-6]
+    assert min(moving) >= 2 * end
+    np.testing.assert_allclose(offset[max(offset)], offset[min(offset)], atol=1e-6)
+    content = b"".join(messages_of(html))
+    for name in (b"object39", b"/task/goal"):
+        assert name in content
 
 
 @pytest.mark.parametrize(("control", "frames"), [(25, 25), (100, 25), (30, 30), (31, 15.5), (1, 1)])
@@ -139,20 +126,17 @@ def test_frames_are_drawn_at_control_instants(control: float, frames: float) -> 
     assert frame_rate(control) == frames
 
 
-def test_a_start_that_touches_is_told_and_the_recording_goes_on(tmp_path: Path) -> None:
+def test_an_invalid_start_is_recorded_as_nothing_and_bad_paths_are_one_error(
+    tmp_path: Path,
+) -> None:
     scenario = free_space(0.2)
     clutter = make_clutter(cylinder(*EASY_START[:2]))
-    recording, environment = ReachRecording(scenario, clutter), Environment(scenario, clutter)
-    for x0, expected in ((EASY_START, "invalid_start"), (EASY_START + [0, 0.1, 0], "timeout")):
-        result = environment.reach(P_WG, x0, keep_states=True)
-        assert result.outcome == expected
-        recording.add_reach(result.trace, P_WG)
+    recording = Recording(scenario, clutter)
+    result = Environment(scenario, clutter).reach(P_WG, EASY_START, keep_states=True)
+    assert result.outcome == "invalid_start"
+    recording.add_reach(result.trace, P_WG)
     recording.save(tmp_path / "reach.html")
     assert (tmp_path / "reach.html").stat().st_size > 100_000
-
-
-def test_what_cannot_be_written_is_one_clear_error(tmp_path: Path) -> None:
-    recording = ReachRecording(free_space(0.2), make_clutter())
     for path in (tmp_path / "none" / "reach.html", tmp_path):
         with pytest.raises(LicError) as caught:
             recording.save(path)
@@ -164,7 +148,7 @@ def test_what_cannot_be_written_is_one_clear_error(tmp_path: Path) -> None:
 def test_a_browser_shows_arm_clutter_goal_and_start_line(tmp_path: Path, chromium: str) -> None:
     scenario = load_scenario("cylinder-clutter", "{stop: {timeout_s: 0.4}}")
     instance = scenario.sample_instance("evaluation", 0)
-    recording = ReachRecording(scenario, instance)
+    recording = Recording(scenario, instance)
     result = Environment(scenario, instance).reach(P_WG, EASY_START, keep_states=True)
     recording.add_reach(result.trace, P_WG)
     recording.save(tmp_path / "reach.html")
@@ -179,8 +163,17 @@ def test_a_browser_shows_arm_clutter_goal_and_start_line(tmp_path: Path, chromiu
 
 @pytest.mark.slow
 @pytest.mark.browser
-def test_an_empty_scene_and_a_console_error_are_noticed(tmp_path: Path, chromium: str) -> None:
-    page = tmp_path / "page.html"
+def test_a_browser_plays_it_inside_another_page(tmp_path: Path, chromium: str) -> None:
+    scenario = load_scenario("cylinder-clutter")
+    recording = Recording(scenario, scenario.sample_instance("evaluation", 0))
+    recording.move_to(np.array([0.0, 0.1, 0.0]), EASY_POSTURE)
+    recording.add_reach(ReachTrace(), P_WG)
+    page = tmp_path / "notebook.html"
+    frame = embed(recording.html(), height_px=700)
+    page.write_text(f"<!DOCTYPE html><html><body>{frame}</body></html>", encoding="utf-8")
+    image, console = visit(chromium, f"file://{page}", tmp_path)
+    assert console == []
+    assert_shows_a_scene(image[60:])
     page.write_text("<body><script>console.log('one'); none()</script></body>", encoding="utf-8")
     image, console = visit(chromium, f"file://{page}", tmp_path)
     assert len(console) == 2

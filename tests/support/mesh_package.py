@@ -71,8 +71,7 @@ def _link(name: str, mesh: str) -> str:
     seen = f'<origin xyz="0 0 0.01"/><geometry><mesh filename="{file}"{scale}/></geometry>'
     if mesh == "base":
         seen += '<material name="blue"><color rgba="0.2 0.4 0.6 1"/></material>'
-    # What is to be hit is not there: nobody may want it.
-    hit = '<geometry><mesh filename="package://drake_models/none.obj"/></geometry>'
+    hit = f'<geometry><mesh filename="{file}"/></geometry>'
     if not mesh:
         seen = hit = '<geometry><box size="1 1 1"/></geometry>'
     return f'<link name="{name}"><visual>{seen}</visual><collision>{hit}</collision></link>'

@@ -2,18 +2,25 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
-from matplotlib.patches import Ellipse, Polygon
+from matplotlib.patches import Ellipse, Polygon, Rectangle
 from support.ray_casting import blank, tilted
 
 from lic_drake.perception.apertures import DetectedApertures
 from lic_drake.perception.goal import DetectedGoal
-from lic_drake.show.drawing import (
+from lic_drake.reach.pointing_starts import pointing_starts
+from lic_drake.reach.scenario import load_scenario
+from lic_drake.reach.start import Starts
+from lic_drake.select.objective import Objective
+from lic_drake.show.apertures import draw_aperture_map, estimate_apertures
+from lic_drake.show.detections import (
     STATE_COLORS,
     draw_apertures,
     draw_goal,
     draw_passable_probability,
 )
 
+BLOCKED = load_scenario("sphere-aperture-clutter", "{clutter: {num_blocked: 6}}")
+STARTS = pointing_starts(BLOCKED, BLOCKED.sample_instance("holdout", 0))
 IMAGE = blank(tilted(0.0), np.array([0.0, 0.0, 1.0]))
 CENTRES = np.array([[1.0, 0.1 * k, 1.0] for k in (-2, 0, 2)])
 CORNERS = CENTRES[:, None] + 0.05 * np.array([[0, -1, -1], [0, 1, -1], [0, 1, 1], [0, -1, 1]])
@@ -27,7 +34,38 @@ FOUND = DetectedApertures(
 )
 
 
-def test_apertures_are_outlined_in_the_colour_of_their_state() -> None:
+class HeightAlone(Objective):
+    """Estimates that are the height of the tool, beyond 1 for the highest."""
+
+    def values(self, conditions: Starts) -> np.ndarray:
+        return conditions.x0[:, 2]
+
+
+def test_the_estimate_of_an_aperture_is_the_best_from_there_as_a_probability() -> None:
+    objective = HeightAlone(model=None, p_WG=np.zeros(3))  # type: ignore[arg-type]
+    best = estimate_apertures(objective, STARTS)
+    reachable = np.array(
+        [np.any(np.all(np.isclose(STARTS.grid.x0[:, :3], p), axis=1)) for p in STARTS.p_WA]
+    )
+    np.testing.assert_allclose(best[reachable], np.clip(STARTS.p_WA[reachable, 2], 0.0, 1.0))
+    assert np.all(np.isnan(best[~reachable]))
+
+
+def test_open_apertures_show_numbers_and_blocked_ones_are_hatched() -> None:
+    ax = Figure().subplots()
+    probability = np.linspace(0.1, 0.8, len(STARTS.p_WA))
+    chosen = [("attempt 1", STARTS.p_WA[3])]
+    draw_aperture_map(ax, STARTS, probability, np.array([0.84, -0.1, 0.8]), chosen)
+    texts = [text.get_text() for text in ax.texts]
+    assert sum(text.endswith("%") for text in texts) == 14
+    assert f"{100 * probability[3]:.0f} %" in texts
+    assert "attempt 1" in texts
+    hatched = [p for p in ax.patches if isinstance(p, Rectangle) and p.get_hatch()]
+    assert len(hatched) == 6
+    assert ax.xaxis_inverted()  # The robot's left is on the left.
+
+
+def test_detected_apertures_are_outlined_in_the_colour_of_their_state() -> None:
     ax = draw_apertures(Figure().subplots(), IMAGE, FOUND)
     outlines = [patch for patch in ax.patches if isinstance(patch, Polygon)]
     for patch, corners, state in zip(outlines, CORNERS, FOUND.states, strict=True):
@@ -36,7 +74,7 @@ def test_apertures_are_outlined_in_the_colour_of_their_state() -> None:
     assert [text.get_text() for text in ax.texts] == ["1.00", "0.25", "0.00"]
 
 
-def test_the_whiter_an_aperture_the_more_passable_it_is() -> None:
+def test_the_brighter_an_aperture_the_more_passable_it_is() -> None:
     probability = np.array([0.9, 0.2, np.nan])
     ax = draw_passable_probability(Figure().subplots(), IMAGE, FOUND, probability)
     shades = [p.get_facecolor()[0] for p in ax.patches if isinstance(p, Polygon)]
@@ -46,7 +84,7 @@ def test_the_whiter_an_aperture_the_more_passable_it_is() -> None:
         draw_passable_probability(Figure().subplots(), IMAGE, FOUND, np.ones(2))
 
 
-def test_a_goal_is_drawn_as_the_ball_and_two_standard_deviations() -> None:
+def test_a_detected_goal_is_drawn_as_the_ball_and_two_standard_deviations() -> None:
     # 1 cm along the image's x, that is along -Wy, and 2 cm along its y.
     covariance = np.diag([0.0, 0.01**2, 0.02**2])
     goal = DetectedGoal(p_WG=np.array([1.5, 0.3, 1.2]), covariance=covariance, num_pixels=100)

@@ -1,0 +1,108 @@
+"""What all figures share: files, colours, labels."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.errors import LicError
+from lic_drake.evaluate.trial import Attempt
+from lic_drake.reach.request import is_within_reach
+from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.start import IN_PLANE, Start
+from lic_drake.reach.starts import Starts, make_starts
+from lic_drake.reach.trace import ReachTrace
+from lic_drake.select.lic import LicSelector
+from lic_drake.select.situation import FailedReach, Situation
+from lic_drake.types import Vector
+
+ATTEMPT_COLORS = ("tab:blue", "tab:purple", "tab:green", "tab:olive", "tab:cyan")
+"""Colours of successive attempts, repeated if there are more."""
+
+
+def save_figure(figure: Figure, path: Path, margins: bool = True) -> None:
+    """Writes a figure at 150 dots per inch.
+
+    Args:
+        figure: The figure.
+        path: The file; its ending gives the format.
+        margins: Whether to crop it to what is drawn, with small margins.
+
+    Raises:
+        LicError: The file cannot be written.
+    """
+    try:
+        figure.savefig(path, dpi=150, bbox_inches="tight" if margins else None)
+    except (OSError, ValueError) as error:
+        raise LicError(f"cannot write {path}: {getattr(error, 'strerror', error)}") from None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShownTrial:
+    """A trial with everything that pictures show of it.
+
+    Attributes:
+        scenario: Robot and task.
+        instance: The environment.
+        p_WG: The goal, shape (3,), metres.
+        attempts: The attempts, all but the last one failures.
+        traces: Their samples with their states.
+    """
+
+    scenario: Scenario
+    instance: ClutterInstance
+    p_WG: Vector
+    attempts: Sequence[Attempt]
+    traces: Sequence[ReachTrace]
+
+    def labelled_traces(self) -> list[tuple[str, ReachTrace]]:
+        """Returns each trace with the number and outcome of its attempt."""
+        return [(f"attempt {i}: {a.record.outcome}", t) for i, (a, t) in enumerate(self, start=1)]
+
+    def __iter__(self) -> Iterator[tuple[Attempt, ReachTrace]]:
+        """Yields attempts with their traces."""
+        return iter(zip(self.attempts, self.traces, strict=True))
+
+
+def situations(
+    attempts: Sequence[Attempt], starts: Sequence[Starts]
+) -> Iterator[tuple[int, Attempt, Situation]]:
+    """Yields each attempt with its number, from 1, and the situation in which it was selected.
+
+    Args:
+        attempts: The attempts, all but the last one failures.
+        starts: The feasible starts before each of them.
+    """
+    for i, attempt in enumerate(attempts):
+        failed = tuple(FailedReach.from_record(earlier.record) for earlier in attempts[:i])
+        situation = Situation(p_WG=attempt.request.goal, starts=starts[i], failed=failed)
+        yield i + 1, attempt, situation
+
+
+def estimate_title(selector: LicSelector, number: int, attempt: Attempt) -> str:
+    """Returns which estimate is shown for an attempt, from 1, and how that ended."""
+    model = 1 if selector.second is None else min(number, 2)
+    outcome = attempt.record.outcome
+    return f"attempt {number}, LIC-{model} ({selector.method}): {outcome}"
+
+
+def describe_start(start: Start) -> str:
+    """Returns a start in words."""
+    x0, (x, y, torso) = start.x0, start.b0
+    base = f", base at y {y:+.3f} m" if x or y else ""
+    if len(x0) == IN_PLANE:
+        return f"y {x0[1]:+.3f} m, phi {np.rad2deg(x0[2]):+.1f} degrees{base}"
+    position = ", ".join(f"{value:.3f}" for value in x0[:3])
+    return f"the aperture at ({position}) m{base}, torso at {torso:.3f} m"
+
+
+def is_reachable(scenario: Scenario, stream: str, environment: int, p_WG: Vector) -> bool:
+    """Returns whether the arm is long enough for a goal from one of the feasible bases."""
+    starts = make_starts(scenario, scenario.sample_instance(stream, environment))
+    return any(
+        is_within_reach(scenario, p_WG - [x, y, 0.0], torso_m)
+        for x, y, torso_m in np.unique(starts.grid.b0, axis=0)
+    )

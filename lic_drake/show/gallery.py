@@ -1,0 +1,254 @@
+"""A gallery as one static page: per category, the first trials that succeed and that fail."""
+
+import html
+import io
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure
+
+import lic_drake
+from lic_drake.evaluate.paper import label
+from lic_drake.evaluate.trial import Attempt, run_trial
+from lic_drake.experience.added import added_columns
+from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.reach.rollout import simulate_request
+from lic_drake.reach.scenario import Scenario
+from lic_drake.select.registry import make_selector
+from lic_drake.show.figures import ShownTrial, describe_start, is_reachable
+from lic_drake.show.page import UNPACK, make_page, pack, picture
+from lic_drake.show.pictures import record_trial
+from lic_drake.show.views import draw_view
+from lic_drake.types import Vector
+
+MAX_ENVIRONMENTS = 300
+"""Number of environments that are tried for a success, and a failure."""
+
+STREAM = "evaluation"
+"""Seed stream of the environments; none of them is in a library."""
+
+HEADS = (
+    "attempt",
+    "start",
+    "estimated success, %",
+    "outcome",
+    "simulated, s",
+    "nearest to goal, mm",
+    "peak force, N",
+)
+"""Heads of the table of attempts."""
+
+_STYLE = """
+section { background: #fff; border: 1px solid #ddd; border-radius: 6px; padding: 1rem;
+  margin: 1rem 0; }
+.reached { color: #1a7f37; } .missed { color: #b42318; }
+.stage { display: grid; grid-template-columns: minmax(0, 1fr) minmax(0, 1fr); gap: 1rem; }
+.scene { min-height: 24rem; background: #f7f7fa; border: 1px solid #ddd; position: relative; }
+.scene iframe { border: 0; height: 100%; position: absolute; inset: 0; }
+.scene button { position: absolute; inset: 0; margin: auto; width: 11rem; height: 3rem;
+  font: inherit; cursor: pointer; }
+.numbers { overflow-x: auto; }
+table { border-collapse: collapse; font-size: 0.9rem; }
+th, td { padding: 0.2rem 0.8rem 0.2rem 0; text-align: right; border-bottom: 1px solid #eee; }
+@media (max-width: 50rem) { .stage { grid-template-columns: 1fr; } }
+"""
+
+# Recordings start on request: many at a time would be too much for a browser.
+_SCRIPT = f"""
+const unpack = {UNPACK};
+async function play(scene) {{
+  const frame = document.createElement("iframe");
+  frame.title = scene.dataset.title;
+  scene.replaceChildren(frame);
+  frame.srcdoc = await unpack(document.getElementById(scene.dataset.recording).textContent);
+}}
+for (const scene of document.querySelectorAll(".scene"))
+  scene.querySelector("button").addEventListener("click", () => play(scene));
+const asked = location.hash && document.getElementById(location.hash.slice(1));
+if (asked) play(asked.querySelector(".scene"));
+"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Exhibit:
+    """A trial of the gallery.
+
+    Attributes:
+        scenario: Its scenario.
+        environment: Index of the environment in the stream `STREAM`.
+        p_WG: Goal, shape (3,), metres.
+        attempts: The attempts in their order.
+        recording: All attempts as a page that plays offline.
+        view: View from above with all attempts, a PNG image.
+    """
+
+    scenario: Scenario
+    environment: int
+    p_WG: Vector
+    attempts: list[Attempt]
+    recording: str
+    view: bytes
+
+    @property
+    def success(self) -> bool:
+        """Whether the last attempt reached the goal."""
+        return self.attempts[-1].record.success
+
+
+def choose_exhibits(
+    library: ExperienceLibrary,
+    method: str = "gp",
+    each: int = 1,
+    first_environment: int = 0,
+    attempts: int = 2,
+    say: Callable[[str], None] = print,
+) -> list[Exhibit]:
+    """Returns the first trials that reach their goal and the first that do not.
+
+    Environments are taken in order, so that nothing is cherry-picked; those whose goal is out of
+    the arm's reach are skipped.
+
+    Args:
+        library: Experience to learn from; it gives the scenario.
+        method: Strategy, see `lic_drake.select.registry.method_names`.
+        each: Number of successes, and of failures.
+        first_environment: Index of the environment to begin with.
+        attempts: Largest number of attempts at a goal.
+        say: Gets a line for every exhibit.
+
+    Raises:
+        LicError: The method or the library cannot be used.
+    """
+    scenario = library.scenario()
+    selector = make_selector(
+        method,
+        scenario.arm(),
+        library.columns(),
+        np.random.default_rng(first_environment),
+        scenario.category,
+        added=added_columns(library),
+    )
+    wanted = {True: each, False: each}
+    exhibits = []
+    goals = ((i, scenario.sample_goal(STREAM, i)) for i in itertools.count(first_environment))
+    reachable = (pair for pair in goals if is_reachable(scenario, STREAM, *pair))
+    for environment, p_WG in itertools.islice(reachable, MAX_ENVIRONMENTS):
+        done = run_trial(scenario, selector, STREAM, environment, p_WG, attempts)
+        success = done[-1].record.success
+        if wanted[success] == 0:
+            continue
+        wanted[success] -= 1
+        exhibits.append(_exhibit(scenario, environment, p_WG, done))
+        outcomes = ", ".join(attempt.record.outcome for attempt in done)
+        say(f"{scenario.category}, environment {environment}: {outcomes}")
+        if not any(wanted.values()):
+            break
+    return sorted(exhibits, key=lambda exhibit: not exhibit.success)
+
+
+def _exhibit(scenario: Scenario, environment: int, p_WG: Vector, done: list[Attempt]) -> Exhibit:
+    """Simulates the attempts of a trial again, with everything that is shown of them."""
+    instance = scenario.sample_instance(STREAM, environment)
+    traces = [simulate_request(attempt.request, keep_states=True).trace for attempt in done]
+    trial = ShownTrial(
+        scenario=scenario, instance=instance, p_WG=p_WG, attempts=done, traces=traces
+    )
+    figure = Figure(figsize=(6, 6.4), layout="constrained")
+    draw_view(figure.subplots(), scenario, instance, p_WG, trial.labelled_traces())
+    view = io.BytesIO()
+    figure.savefig(view, format="png", dpi=80)
+    return Exhibit(
+        scenario=scenario,
+        environment=environment,
+        p_WG=p_WG,
+        attempts=done,
+        recording=record_trial(trial).html(),
+        view=view.getvalue(),
+    )
+
+
+def make_gallery(exhibits: Sequence[Exhibit], method: str) -> str:
+    """Returns the page; opened at `#<category>-<environment>` it plays that recording at once.
+
+    Args:
+        exhibits: What to show, in this order.
+        method: Strategy that selected the starts.
+    """
+    parts = [
+        f"<p>Starts selected by {html.escape(label(method))} in environments that are in no"
+        " experience library: for each category the first environments in which the goal was"
+        " reached, and the first in which it was not. Each row is one reach.</p>"
+    ]
+    for category in dict.fromkeys(exhibit.scenario.category for exhibit in exhibits):
+        parts.append(f"<h2>{html.escape(category)}</h2>")
+        parts += [_section(e) for e in exhibits if e.scenario.category == category]
+    versions = sorted({exhibit.attempts[0].record.drake_version for exhibit in exhibits})
+    parts.append(
+        f"<footer>Made by lic_drake {lic_drake.__version__} with Drake"
+        f" {html.escape(', '.join(versions))}; the page needs no network.</footer>"
+    )
+    return make_page("Reaches into clutter", "\n".join(parts), _STYLE, _SCRIPT)
+
+
+def numbers_of(number: int, attempt: Attempt) -> dict[str, object]:
+    """Returns the numbers of an attempt, from 1; None where nothing was measured or estimated."""
+    start, record = attempt.selection.start, attempt.record
+    values = {
+        "estimated_success": attempt.selection.probability,
+        "duration_s": record.duration_s,
+        "min_distance_m": record.min_distance,
+        "peak_force_N": record.peak_force,
+    }
+    return {
+        "attempt": number,
+        "start": start.x0.tolist(),
+        "base": start.b0.tolist(),
+        "outcome": record.outcome,
+        **{k: None if v is None or math.isnan(v) else v for k, v in values.items()},
+    }
+
+
+def _section(exhibit: Exhibit) -> str:
+    """Returns a trial's part of the page."""
+    name = html.escape(f"{exhibit.scenario.category}-{exhibit.environment}", quote=True)
+    word, kind = ("reached", "reached") if exhibit.success else ("not reached", "missed")
+    goal = ", ".join(f"{value:.3f}" for value in exhibit.p_WG)
+    rows = "\n".join(
+        f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in _cells(number, attempt))}</tr>"
+        for number, attempt in enumerate(exhibit.attempts, start=1)
+    )
+    return f"""<section id="{name}">
+<h3>Environment {exhibit.environment}, goal ({goal}) m: <span class="{kind}">{word}</span></h3>
+<div class="stage">
+{picture(exhibit.view, "image/png", alt=f"{name} from above")}
+<div class="scene" data-recording="{name}-recording" data-title="{name}">
+<button>Play the recording</button></div>
+</div>
+<div class="numbers"><table>
+<tr>{"".join(f"<th>{head}</th>" for head in HEADS)}</tr>
+{rows}
+</table></div>
+<p><small>Scenario {exhibit.scenario.digest}, seed stream {STREAM}.</small></p>
+<script type="text/plain" id="{name}-recording">{pack(exhibit.recording)}</script>
+</section>"""
+
+
+def _cells(number: int, attempt: Attempt) -> list[str]:
+    values = numbers_of(number, attempt)
+
+    def show(key: str, digits: int, scale: float = 1.0) -> str:
+        value = values[key]
+        return f"{scale * value:.{digits}f}" if isinstance(value, float) else "–"
+
+    return [
+        str(number),
+        describe_start(attempt.selection.start),
+        show("estimated_success", 0, 100.0),
+        attempt.record.outcome,
+        show("duration_s", 1),
+        show("min_distance_m", 0, 1000.0),
+        show("peak_force_N", 1),
+    ]

@@ -1,0 +1,77 @@
+"""A scene for pictures: robot and clutter are placed as a reach had them."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from pydrake.systems.framework import Context, DiagramBuilder
+
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.trace import SceneState
+from lic_drake.scene.furnish import place_robot
+from lic_drake.scene.scene import Scene, add_scene
+from lic_drake.show.pr2_meshes import attach_pr2_meshes
+from lic_drake.types import Vector
+
+
+def in_plane(scenario: Scenario) -> bool:
+    """Returns whether the robot is an arm in the plane."""
+    return scenario.arm().surface is None
+
+
+class Stage:
+    """Plant and scene graph of an environment with a robot whose base and torso can be placed.
+
+    Contact forces follow from the state alone, since the plant is continuous.
+
+    Attributes:
+        scene: The scene.
+        meshes: Files of the robot's meshes.
+    """
+
+    def __init__(
+        self,
+        builder: DiagramBuilder,
+        scenario: Scenario,
+        instance: ClutterInstance,
+        drake_models: Path | None = None,
+    ) -> None:
+        """Adds the scene to a builder.
+
+        Args:
+            builder: Gets plant and scene graph.
+            scenario: Robot and contact.
+            instance: The environment.
+            drake_models: Folder of package://drake_models, to show a PR2 in its meshes.
+
+        Raises:
+            ModelError: The meshes cannot be read.
+        """
+        config = replace(scenario.scene, time_step_s=0.0)
+        self.scene = add_scene(
+            builder, scenario.arm(), instance, config, visuals=True, placeable=True
+        )
+        self.meshes = [] if drake_models is None else attach_pr2_meshes(self.scene, drake_models)
+
+
+def place(
+    scene: Scene, root: Context, b0: Vector, q: Vector, state: SceneState | None = None
+) -> None:
+    """Places the robot of a placeable scene, and the clutter if a state is given.
+
+    Args:
+        scene: The scene.
+        root: A context of the diagram that has the scene.
+        b0: Base position (x, y) and torso height, shape (3,), metres.
+        q: Joint angles, shape (m,), radians.
+        state: Gives the joint velocities, otherwise zero, and the state of the clutter.
+    """
+    plant = scene.plant
+    context = plant.GetMyMutableContextFromRoot(root)
+    place_robot(scene, root, b0)
+    plant.SetPositions(context, scene.arm, q)
+    plant.SetVelocities(context, scene.arm, np.zeros(len(q)) if state is None else state.v)
+    if state is not None:
+        plant.SetPositions(context, scene.clutter, state.p_WO.ravel())
+        plant.SetVelocities(context, scene.clutter, state.v_WO.ravel())

@@ -1,0 +1,46 @@
+"""Experience that is made up: no reach is simulated."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from lic_drake.experience.grid import REQUEST_FILE, CollectionRequest, write_request
+from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.reach.scenario import Scenario, load_scenario
+from support.fake_reach import make_record, make_request
+
+
+def planar_library(path: Path, scenario: Scenario) -> ExperienceLibrary:
+    """A library of the planar arm: starts to the left of the base succeed."""
+    library = ExperienceLibrary(path)
+    request = make_request(scenario=scenario, max_starts=None)
+    for environment in request.environment_indices:
+        records = [
+            replace(make_record(item), success=bool(item.start.x0[1] > item.start.b0[1]))
+            for item in request.reaches(environment)
+        ]
+        library.write_shard(f"training-{environment}", records, scenario)
+    return library
+
+
+def sphere_library(path: Path) -> ExperienceLibrary:
+    """A library of short reaches of the PR2: those from apertures near the goal succeed."""
+    scenario = load_scenario("sphere-aperture-clutter", "{stop: {timeout_s: 0.2}}")
+    library = ExperienceLibrary(path)
+    request = CollectionRequest(scenario=scenario, environments=4, max_goals=4)
+    for environment in request.environment_indices:
+        records = []
+        for item in request.reaches(environment):
+            apart = np.hypot(item.start.x0[1] - item.goal[1], item.start.x0[2] - item.goal[2])
+            records.append(replace(make_record(item), success=bool(apart < 0.2)))
+        library.write_shard(f"training-{environment:06d}", records, scenario)
+    write_request(request, library.path / REQUEST_FILE)
+    return library
+
+
+def small_cameras(path: Path) -> Path:
+    """Writes the shipped cameras with a quarter of the pixels."""
+    small = "{camera: {width: 320, height: 240, focal_px: 262.5}}"
+    path.write_text(f"head: {small}\nexternal: {small}\n")
+    return path
