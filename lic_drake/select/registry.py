@@ -109,7 +109,8 @@ def make_selector(
         added: Experience from elsewhere, see `lic_drake.experience.added.added_columns`.
 
     Raises:
-        RequestError: The strategy is unknown, or has no library to learn from.
+        RequestError: The strategy is unknown or has no library to learn from, or there are pairs
+            and no LIC-2.
     """
     check_method(method)
     first, later = split_method(method)
@@ -130,6 +131,10 @@ def make_selector(
     features, only_first = features_of(category), method not in estimator_names()
     estimator = method[:-1] if only_first else method
     second = None
+    if features.second is None and pairs is not None:
+        raise RequestError(
+            f"{category} has no LIC-2 that could learn from second attempts; leave them out"
+        )
     if features.second is not None and not only_first:
         pairs = pair_reaches(columns) if pairs is None else pairs
         added_pairs = None if added is None else pair_reaches(added)

@@ -11,6 +11,7 @@ from lic_drake.reach.start import Start
 from lic_drake.robots.pr2 import Pr2Arm
 from lic_drake.select.baselines import CostSelector, RandomSelector
 from lic_drake.select.planar_lic import PlanarLic
+from lic_drake.select.pointing_lic import PointingLic
 from lic_drake.select.registry import (
     FallbackSelector,
     Selector,
@@ -113,3 +114,15 @@ def test_the_parts_of_a_combination_are_the_strategies_of_their_names() -> None:
     assert isinstance(selector, FallbackSelector)
     assert isinstance(selector.first, RandomSelector)
     assert isinstance(selector.later, CostSelector)
+
+
+def test_behind_a_board_there_is_no_lic_2_and_pairs_for_it_are_refused() -> None:
+    rng, n = np.random.default_rng(0), 60
+    columns = {name: rng.uniform(-0.4, 0.4, n) for name in ("goal_y", "goal_z", "start_y")}
+    columns |= {"start_z": rng.uniform(-0.4, 0.4, n), "success": rng.random(n) < 0.5}
+    columns |= {"environment": np.arange(n) // 6, "stream": np.full(n, "training")}
+    category = "sphere-aperture-clutter"
+    selector = make_selector("knn", Pr2Arm(), columns, category=category)
+    assert isinstance(selector, PointingLic) and selector.second is None
+    with pytest.raises(RequestError, match="sphere-aperture-clutter has no LIC-2"):
+        make_selector("knn", Pr2Arm(), columns, category=category, pairs=columns)
