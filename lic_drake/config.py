@@ -118,6 +118,8 @@ def read_section[T](schema: type[T], data: Any, source: str, defaults: T | None 
     """
     from pydrake.common.yaml import yaml_load_typed  # Configurations alone do not need Drake.
 
+    if data is not None and not isinstance(data, dict):
+        raise ScenarioError(f"{source} must be a YAML mapping, got {data!r}")
     try:
         # Drake's reader takes text only.
         section: T = yaml_load_typed(  # type: ignore[no-untyped-call]

@@ -28,14 +28,21 @@ class Registry[T]:
             error: What to raise.
         """
         self.entries: dict[str, T] = {}
+        self._origins: dict[str, str] = {}
         self._kind = kind
         self._error = error
 
-    def register(self, name: str, entry: T) -> None:
+    def register(self, name: str, entry: T, made_by: object | None = None) -> None:
         """Adds an entry.
 
         The code that registered an entry may register it again, as a notebook cell does that is
         run twice; no other code may take its name.
+
+        Args:
+            name: The name.
+            entry: The entry.
+            made_by: The class or function that tells whose it is; by default the entry itself, or
+                its class.
 
         Raises:
             LicError: The name is not a plain word or is taken.
@@ -45,12 +52,15 @@ class Registry[T]:
                 f"{name!r} cannot be the name of a {self._kind}; use letters, digits, hyphens and"
                 " underscores"
             )
-        if name in self.entries and _origin(self.entries[name]) != _origin(entry):
+        maker = entry if made_by is None else made_by
+        maker = maker if hasattr(maker, "__qualname__") else type(maker)
+        origin = f"{maker.__module__}.{getattr(maker, '__qualname__', maker)}"
+        if name in self.entries and self._origins[name] != origin:
             raise self._error(
-                f"the {self._kind} {name!r} is already registered by"
-                f" {'.'.join(_origin(self.entries[name]))}; choose another name"
+                f"the {self._kind} {name!r} is already registered by {self._origins[name]}; choose"
+                " another name"
             )
-        self.entries[name] = entry
+        self.entries[name], self._origins[name] = entry, origin
 
     def get(self, name: str) -> T:
         """Returns the entry with this name.
@@ -86,9 +96,3 @@ def load_extensions() -> None:
                 f"{VARIABLE} names {name!r}, which cannot be imported ({error}); put the folder of"
                 f" {name}.py on PYTHONPATH"
             ) from error
-
-
-def _origin(entry: object) -> tuple[str, str]:
-    """Returns module and name of the class or function that an entry is or was made by."""
-    maker = entry if hasattr(entry, "__qualname__") else type(entry)
-    return str(maker.__module__), str(getattr(maker, "__qualname__", maker))

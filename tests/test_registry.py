@@ -10,9 +10,8 @@ from lic_drake.clutter import registry as clutter
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.clutter.registry import get_category, register_category
 from lic_drake.errors import EstimateError, LicError, ScenarioError
-from lic_drake.estimate import features as categories
 from lic_drake.estimate import registry as estimate
-from lic_drake.estimate.features import PLANAR_LIC1, features_of, register_features
+from lic_drake.estimate.features import PLANAR_LIC1, features_of
 from lic_drake.estimate.nearest_neighbours import NearestNeighbours
 from lic_drake.estimate.registry import register_estimator
 from lic_drake.paths import models_dir
@@ -31,7 +30,7 @@ def make_category(name: str = "Mine", **changes: object) -> type:
 
 @pytest.fixture(autouse=True)
 def _restore(monkeypatch: pytest.MonkeyPatch) -> None:
-    for registry in (clutter._CATEGORIES, categories._CATEGORIES, estimate._ESTIMATORS):
+    for registry in (clutter._CATEGORIES, estimate._ESTIMATORS):
         monkeypatch.setattr(registry, "entries", dict(registry.entries))
 
 
@@ -44,7 +43,7 @@ def test_a_name_is_one_plain_word(name: object) -> None:
 def test_a_cell_that_is_run_again_replaces_its_entry() -> None:
     for size_m in (0.1, 0.2):
         register_category("mine", make_category(size_m=size_m))
-    assert get_category("mine")().size_m == 0.2
+    assert get_category("mine").sampler().size_m == 0.2
 
 
 def test_nobody_takes_anothers_name() -> None:
@@ -94,14 +93,16 @@ def test_entries_are_checked_when_they_are_registered() -> None:
         register_estimator("mine", NearestNeighbours())
 
 
-def test_features_of_a_category_may_be_said_twice_but_not_otherwise() -> None:
-    register_features("mine")
-    register_features("mine")
+def test_features_are_registered_with_the_category() -> None:
+    register_category("mine", make_category())
     assert features_of("mine").first == PLANAR_LIC1
-    with pytest.raises(EstimateError, match="other features"):
-        register_features("mine", observed=("first_final_x",))
-    with pytest.raises(EstimateError, match="observed"):
-        register_features("yours", observed=("smell",))
+    assert features_of("mine").second is not None
+    register_category("mine", make_category(), in_space=True, observed=None)
+    assert features_of("mine").second is None
+    assert features_of("mine").first.in_space
+    register_category("mine", make_category(), observed=("smell",))
+    with pytest.raises(EstimateError, match=r"observed.*smell"):
+        features_of("mine")
 
 
 def described(*changes: tuple[str, str]) -> str:

@@ -1,5 +1,3 @@
-import subprocess
-import sys
 import zlib
 
 import numpy as np
@@ -21,17 +19,11 @@ def draw(stream: str, purpose: str, indices: tuple[int, ...]) -> list[int]:
     return list(make_generator(stream, purpose, *indices).integers(0, 2**62, size=4))
 
 
-@given(ADDRESSES)
-def test_the_same_address_gives_the_same_draws(
-    address: tuple[str, str, tuple[int, int]],
-) -> None:
-    assert draw(*address) == draw(*address)
-
-
 @given(ADDRESSES, ADDRESSES)
 def test_different_addresses_give_different_draws(
     a: tuple[str, str, tuple[int, int]], b: tuple[str, str, tuple[int, int]]
 ) -> None:
+    assert draw(*a) == draw(*a)
     if a != b:
         assert draw(*a) != draw(*b)
 
@@ -42,24 +34,6 @@ def test_streams_purposes_and_neighbouring_indices_are_uncorrelated() -> None:
     correlation = np.corrcoef(samples) - np.eye(len(samples))
     # 4000 independent draws: standard deviation 0.016, 276 pairs.
     assert np.max(np.abs(correlation)) < 5.0 / np.sqrt(4000)
-
-
-def test_another_process_with_another_hash_seed_draws_the_same() -> None:
-    program = (
-        "from lic_drake.seeds import make_generator;"
-        "print(list(map(int, make_generator('holdout', 'goal', 7, 3).integers(0, 2**62, 4))))"
-    )
-    outputs = [
-        subprocess.run(
-            [sys.executable, "-c", program],
-            env={"PYTHONHASHSEED": seed},
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout.strip()
-        for seed in ("1", "2")
-    ]
-    assert outputs == [str([int(x) for x in draw("holdout", "goal", (7, 3))])] * 2
 
 
 def test_the_mapping_from_address_to_numpy_seed_does_not_change() -> None:

@@ -1,7 +1,4 @@
-"""From records, goals and starts to feature vectors x, and the features of each category.
-
-A new category calls `register_features` beside `lic_drake.clutter.registry.register_category`.
-"""
+"""From records, goals and starts to feature vectors x, and the features of each category."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
@@ -11,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lic_drake.clutter.registry import get_category
 from lic_drake.errors import EstimateError
 from lic_drake.experience.second_reach import FIRST_PREFIX, SHOWN
-from lic_drake.registry import Registry
 from lic_drake.types import BoolVector, IntVector, Vector
 
 _GOAL = ("goal_x", "goal_y", "goal_z")
@@ -303,55 +300,16 @@ class CategoryFeatures:
     second: FeatureMap | None
 
 
-_CATEGORIES: Registry[CategoryFeatures] = Registry("category", EstimateError)
-
-# The paper's x0': in the plane a start is its place on the line and its direction.
-_FIRST_START = ("first_start_y", "first_start_phi")
-
-
-def register_features(
-    name: str, first: FeatureMap = PLANAR_LIC1, observed: tuple[str, ...] | None = _FIRST_START
-) -> None:
-    """Registers the features of a category.
-
-    Args:
-        name: The clutter category.
-        first: Features of LIC-1; by default those of the plane.
-        observed: What LIC-2 has besides, see `FeatureMap.observed`; by default where the first
-            reach started. None: the category has no LIC-2.
-
-    Raises:
-        EstimateError: A feature is unknown, or the category has other features already.
-    """
-    second = None if observed is None else replace(first, observed=observed, relative=False)
-    features = CategoryFeatures(first=first, second=second)
-    if _CATEGORIES.entries.get(name, features) != features:
-        raise EstimateError(
-            f"the category {name!r} has other features already; choose another name for yours"
-        )
-    _CATEGORIES.register(name, features)
-
-
 def features_of(category: str) -> CategoryFeatures:
-    """Returns the features of a category.
+    """Returns the features of a category, as it was registered.
 
     Raises:
-        EstimateError: The category is unknown.
+        ScenarioError: The category is unknown.
+        EstimateError: One of its features is unknown.
     """
-    if category not in _CATEGORIES.names():
-        raise EstimateError(
-            f"no features are registered for the category {category!r}, only for"
-            f" {', '.join(_CATEGORIES.names())}; call register_features"
-        )
-    return _CATEGORIES.get(category)
-
-
-register_features("cylinder-clutter", observed=(*_FIRST_START, "first_final_x", "first_final_y"))
-register_features("passage-clutter", observed=(*_FIRST_START, "first_final_vx", "first_final_vy"))
-register_features("cylinder-aperture-clutter")
-# A failure behind a board tells little but that the first choice was wrong: LIC-1 away from the
-# failed start succeeded in 20 of 297 second attempts (K-NN 28 of 312), LIC-2 from local rows in 6
-# (22), and LIC-2 with LIC-1's estimate as a feature in 15 (25)
-# (notebooks/results/ablation/space_features.md).
-register_features("sphere-aperture-clutter", SPACE_LIC1, observed=None)
-register_features("foliage-aperture-clutter", SPACE_LIC1, observed=None)
+    known = get_category(category)
+    first = SPACE_LIC1 if known.in_space else PLANAR_LIC1
+    if known.observed is None:
+        return CategoryFeatures(first=first, second=None)
+    second = replace(first, observed=known.observed, relative=False)
+    return CategoryFeatures(first=first, second=second)

@@ -142,24 +142,18 @@ def load_scenario(name_or_path: str | Path, overrides: str = "") -> Scenario:
 def parse_scenario(content: str | bytes, overrides: str = "", source: str = "scenario") -> Scenario:
     """Builds a scenario from YAML text; see `load_scenario`."""
     data = merge(read_mapping(content, source), read_mapping(overrides, "overrides"))
-    sections = {"category", "robot", "clutter", "task", "scene", "mpc", "stop"}
-    unknown = set(data) - sections
+    sections = [item.name for item in dataclasses.fields(Scenario)]
+    unknown = [str(key) for key in data if key not in sections]
     if unknown:
-        raise ScenarioError(
-            f"{source}: unknown key {sorted(map(str, unknown))[0]!r}; known: {sorted(sections)}"
-        )
-    if "category" not in data or "robot" not in data:
-        raise ScenarioError(f"{source}: needs the keys 'category' and 'robot'")
-    for key, value in data.items():
-        if key in ("category", "robot"):
-            if not isinstance(value, str):
-                raise ScenarioError(f"{source}: {key} must be a name, got {value!r}")
-        elif value is not None and not isinstance(value, dict):
-            raise ScenarioError(f"{source}: {key} must be a YAML mapping, got {value!r}")
-    sampler = get_category(data["category"])
+        raise ScenarioError(f"{source}: unknown key {unknown[0]!r}; known: {sorted(sections)}")
+    for key in ("category", "robot"):
+        if not isinstance(data.get(key), str):
+            raise ScenarioError(f"{source}: {key} must be a name, got {data.get(key)!r}")
+    sampler = get_category(data["category"]).sampler
     get_robot(data["robot"])
-    mpc = dict(data.get("mpc") or {})
-    preset = mpc.pop("preset", "haptic_mpc_2013")
+    mpc, preset = data.get("mpc"), "haptic_mpc_2013"
+    if isinstance(mpc, dict):
+        preset = mpc.pop("preset", preset)
     if not isinstance(preset, str) or preset not in PRESETS:
         raise ScenarioError(f"{source}: unknown mpc preset {preset!r}; choose {list(PRESETS)}")
     scenario = Scenario(

@@ -8,7 +8,6 @@ from lic_drake.clutter.instance import ClutterInstance, join, make_objects
 from lic_drake.clutter.placement import place_discs
 from lic_drake.clutter.registry import register_category
 from lic_drake.config import check_numbers
-from lic_drake.estimate.features import register_features
 
 
 @dataclass(kw_only=True)
@@ -47,5 +46,5 @@ class ShelfClutter:
         return join(boxes, back, sides)
 
 
+# LIC-1 knows goal and start in the plane; LIC-2 sees where the first reach started, too.
 register_category("shelf-clutter", ShelfClutter)
-register_features("shelf-clutter")  # Goal and start; LIC-2 sees where the first reach started.

@@ -4,13 +4,11 @@ import numpy as np
 import pytest
 
 from lic_drake.errors import EstimateError
-from lic_drake.estimate import features as module
 from lic_drake.estimate.features import (
     PLANAR_LIC1,
     SPACE_LIC1,
     FeatureMap,
     features_of,
-    register_features,
 )
 from lic_drake.experience.second_reach import SHOWN
 
@@ -246,18 +244,3 @@ def test_behind_a_board_there_is_no_lic_2() -> None:
     for name in ("sphere-aperture-clutter", "foliage-aperture-clutter"):
         assert features_of(name).first == SPACE_LIC1
         assert features_of(name).second is None
-
-
-def test_a_category_can_be_added_by_one_call(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module._CATEGORIES, "entries", dict(module._CATEGORIES.entries))
-    register_features("hedge", SPACE_LIC1, ("first_start_y",))
-    assert features_of("hedge").second == replace(
-        SPACE_LIC1, relative=False, observed=("first_start_y",)
-    )
-    with pytest.raises(EstimateError, match="has other features already"):
-        register_features("hedge")
-
-
-def test_an_unknown_category_is_named_with_the_known_ones() -> None:
-    with pytest.raises(EstimateError, match=r"'hedge'.*cylinder-clutter.*register_features"):
-        features_of("hedge")

@@ -6,17 +6,14 @@ import pytest
 from lic_drake.evaluate.paper import (
     LABELS,
     REMARKS,
-    TABLE_I,
     TABLE_II,
-    TABLE_III,
-    TABLE_IV,
     TABLES,
     PaperTable,
     label,
 )
 from lic_drake.evaluate.statistics import Count, two_sample_t_test
 
-ALL = [TABLE_I, TABLE_III, TABLE_IV]
+ALL = TABLE_I, TABLE_III, TABLE_IV = tuple(TABLES.values())
 COLUMNS = [(table, method) for table in ALL for method in table.columns]
 WRONG_SUM = ("III", "knn")
 OFF = {"I": ("rnd", "gp", "knn"), "III": ("rnd", "cost", "gp")}

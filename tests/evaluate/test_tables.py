@@ -4,12 +4,13 @@ import pytest
 from support.trial_rows import make_rows, paper_rows
 
 from lic_drake.errors import LibraryError
-from lic_drake.evaluate.paper import TABLE_I, TABLE_III, TABLE_IV, TABLES, PaperTable
+from lic_drake.evaluate.paper import TABLES, PaperTable
 from lic_drake.evaluate.statistics import mcnemar
 from lic_drake.evaluate.table import Table
 from lic_drake.evaluate.tables import margins_table, success_table, t_test_table
 from lic_drake.evaluate.trials import TrialTable
 
+TABLE_I, TABLE_III, TABLE_IV = TABLES.values()
 SMALL = TrialTable(
     make_rows("rnd", ["1", "01", "00", "00", "00", "00", "00", "00"])
     + make_rows("cost", ["00", "1", "1", "00", "00", "00", "00", "00"])

@@ -10,7 +10,6 @@ from types import ModuleType
 import pytest
 
 from lic_drake.clutter import registry as clutter
-from lic_drake.estimate import features as categories
 from lic_drake.estimate import registry as estimate
 from lic_drake.robots import registry as robots
 
@@ -23,7 +22,6 @@ def extend(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, ModuleType]]:
     """The modules by name, registered until the end of the test."""
     for registry in (
         clutter._CATEGORIES,
-        categories._CATEGORIES,
         robots._ROBOTS,
         estimate._ESTIMATORS,
     ):

@@ -7,7 +7,7 @@ from support.worlds import box, cylinder, make_clutter, make_world
 from lic_drake.scene.scene import SceneConfig
 
 PARKED = np.deg2rad([-140.0, 100.0, 120.0])  # The arm folded at the base, far from the objects.
-TIME_STEPS = [0.0005, 0.0025, 0.005]
+TIME_STEPS = [0.0005, 0.005]
 AXIS_LIMIT = 0.25 * np.pi * 2.0
 """Limit along x or y, N: then the mean resistance over all directions of motion is 2 N."""
 
@@ -26,10 +26,10 @@ def velocity_after_push(
 
 
 @pytest.mark.parametrize("time_step", TIME_STEPS)
-@pytest.mark.parametrize("force", [0.5, 1.0, 1.5])
+@pytest.mark.parametrize("force", [0.0, 0.5, 1.5])
 def test_a_push_below_the_limit_only_makes_an_object_creep(force: float, time_step: float) -> None:
     v = velocity_after_push((force, 0.0), time_step)
-    assert 0.0 < v[0] < 1e-3
+    assert (0.0 < v[0] < 1e-3) if force else v[0] == 0.0
     assert v[1] == 0.0
 
 
@@ -44,19 +44,7 @@ def test_a_push_above_the_limit_accelerates_by_newtons_law(
     assert v[0] == pytest.approx(0.0, abs=1e-12)
 
 
-def test_an_object_in_motion_comes_to_rest_within_the_distance_of_dry_friction() -> None:
-    world = make_world(
-        PARKED, make_clutter(cylinder(0.6, 0.0, movable=True)), SceneConfig(time_step_s=0.0005)
-    )
-    plant = world.scene.plant
-    plant.SetVelocities(world.plant_context, world.scene.clutter, [-0.5, 0.0])
-    world.advance(1.0)
-    travelled = 0.6 - world.objects[0, 0]
-    assert travelled == pytest.approx(0.5 * 0.5**2 / AXIS_LIMIT, rel=0.01)
-    assert np.linalg.norm(world.object_velocities) < 1e-6
-
-
-@pytest.mark.parametrize("angle_deg", [0.0, 15.0, 30.0, 45.0, 70.0])
+@pytest.mark.parametrize("angle_deg", [0.0, 30.0, 45.0])
 def test_resistance_to_motion_is_near_2_newtons_in_every_direction(angle_deg: float) -> None:
     # Coasting at 5 cm/s for one or two steps: energy lost over distance gone.
     direction = np.array([np.cos(np.deg2rad(angle_deg)), np.sin(np.deg2rad(angle_deg))])
@@ -84,13 +72,6 @@ def test_an_object_pushed_off_its_centre_moves_but_never_spins() -> None:
     assert X_WO.translation()[0] > 0.7
     np.testing.assert_array_equal(X_WO.rotation().matrix(), np.eye(3))
     assert X_WO.translation()[2] == 0.0
-
-
-def test_objects_that_nobody_pushes_stay_where_they_are() -> None:
-    clutter = make_clutter(cylinder(0.6, 0.0, movable=True), cylinder(0.7, -0.3, movable=True))
-    world = make_world(PARKED, clutter, SceneConfig())
-    world.advance(2.0)
-    np.testing.assert_allclose(world.objects, [[0.6, 0.0], [0.7, -0.3]], atol=1e-12)
 
 
 def test_a_fixed_object_holds_a_movable_one_that_is_pressed_on_it() -> None:

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from pydrake.systems.analysis import ApplySimulatorConfig, SimulatorConfig
-from support.worlds import World, make_clutter, make_world
+from support.worlds import World, make_world
 
 from lic_drake.clutter.instance import ClutterInstance, make_objects
 from lic_drake.scene.movables import CARRIAGE_SHARE
@@ -68,7 +68,3 @@ def test_a_constant_push_moves_a_sphere_at_force_over_drag(time_step_s: float) -
     np.testing.assert_allclose(velocity(world), force / DRAG, rtol=1e-4)
     # A discrete plant may have taken one of its 40 steps more.
     np.testing.assert_allclose(position(world) - before, 0.2 * force / DRAG, rtol=0.026)
-
-
-def test_what_does_not_float_moves_in_the_plane() -> None:
-    assert make_clutter().num_axes == 2
