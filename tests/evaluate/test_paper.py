@@ -104,16 +104,6 @@ def test_remarks_on_differences_state_their_tests() -> None:
         assert f"t({result.df}) = {result.t:.2f}, p = {p}" in text
 
 
-def test_remarks_on_sample_sizes_multiply() -> None:
-    assert "(63 and 45)" in remark("9 positions") and (9 * 7, 9 * 5) == (63, 45)
-    assert "9,600" in remark("9,025") and 40 * 12 * 20 == 9600
-
-
-def test_every_remark_bears_on_a_table_or_the_text() -> None:
-    assert {r.place for r in REMARKS} == {"I", "II", "III", "IV", "text"}
-    assert all(re.fullmatch(r".+\.", r.text) for r in REMARKS)
-
-
 def test_tables_are_found_by_category_and_strategies_have_the_papers_names() -> None:
     assert {category: table.number for category, table in TABLES.items()} == {
         "cylinder-clutter": "I",

@@ -31,12 +31,6 @@ def test_every_strategy_but_rnd_is_tested_against_it_on_the_same_goals() -> None
     assert isnan(alone[0].p_value)
 
 
-def test_rates_are_those_of_one_variant() -> None:
-    rows = [*make_rows("rnd", ["1"]), *make_rows("rnd", ["0", "0"], variant="fresh")]
-    (rate,) = summarize_trials(TrialTable(rows), 1, "fresh")
-    assert rate.count == (0, 2)
-
-
 def test_the_table_has_a_row_for_each_strategy_and_number_of_attempts() -> None:
     lines = format_rates(summarize_trials(TABLE, 2)).splitlines()
     rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines]

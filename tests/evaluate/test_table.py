@@ -25,12 +25,6 @@ def test_markdown_has_caption_table_and_remarks() -> None:
     assert TABLE._repr_markdown_() == TABLE.to_markdown()
 
 
-def test_markdown_without_remarks_ends_with_the_table() -> None:
-    table = Table(caption="C.", heading=("a",), rows=(("b",),))
-    assert table.to_markdown() == "C.\n\n| a |\n| --- |\n| b |\n"
-    assert "itemize" not in table.to_latex()
-
-
 def test_latex_is_a_plain_table() -> None:
     assert TABLE.to_latex().splitlines() == [
         r"\begin{table}",

@@ -23,7 +23,6 @@ from scripts.bounds.table import (
     bounds_table,
     compute_bounds,
     load_factorial,
-    share_of_gap,
 )
 
 small = arrays(bool, st.tuples(st.integers(2, 4), st.integers(1, 3), st.integers(2, 5)))
@@ -100,11 +99,6 @@ def test_the_bandwidth_follows_how_fast_success_changes_with_the_goal(
     assert smallest < choose_bandwidth(success, goals) < largest
 
 
-def test_equal_scores_share_the_choice() -> None:
-    success = np.array([[[True, False, False]]])
-    assert chosen_rate(success, np.array([[[0.5, 0.5, 0.2]]])).tolist() == [0.5]
-
-
 def test_rows_find_their_places_whatever_their_order() -> None:
     success = np.random.default_rng(3).random((4, 2, 3)) < 0.5
     found = factorial(success, np.broadcast_to(COMMON, (4, 2, 2)))
@@ -164,8 +158,3 @@ def test_intervals_cover_the_rate_of_all_environments() -> None:
         low, high = Bound(name="RND", attempts=1, by_environment=rate).interval()
         covered.append(low <= 0.5 <= high)
     assert np.mean(covered) == pytest.approx(0.9, abs=0.06)
-
-
-def test_share_of_gap() -> None:
-    assert share_of_gap(0.5, 0.4, 0.7) == pytest.approx(-0.5)
-    assert np.isnan(share_of_gap(0.5, 0.5, 0.5))

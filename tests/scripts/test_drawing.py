@@ -12,7 +12,6 @@ from scripts.tables.drawing import (
     AttemptCounts,
     draw_calibration,
     draw_success_bars,
-    draw_success_by_attempts,
     draw_success_by_goal,
 )
 
@@ -96,17 +95,3 @@ def test_the_goal_map_has_rates_and_counts_in_its_cells(ax: Axes) -> None:
     assert texts == {(0.45, -0.35): "1/2", (0.45, 0.05): "1/1", (0.65, 0.15): "0/1"}
     assert (mesh.norm.vmin, mesh.norm.vmax) == (0.0, 100.0)
     assert ax.get_aspect() == 1.0
-
-
-def test_success_grows_with_the_attempts(ax: Axes) -> None:
-    counts = {
-        "knn": [Count(70, 100), Count(80, 100), Count(85, 100)],
-        "rnd": [Count(60, 100), Count(72, 100)],
-    }
-    assert draw_success_by_attempts(ax, counts) is ax
-    rnd, knn = bars(ax)
-    np.testing.assert_allclose(rnd[0], [[1, 60], [2, 72]])
-    np.testing.assert_allclose(knn[0], [[1, 70], [2, 80], [3, 85]])
-    np.testing.assert_allclose(knn[1][2], 100 * np.array(wilson_interval(85, 100)))
-    assert legend(ax) == ["RND, n = 100", "LIC(K-NN), n = 100"]
-    np.testing.assert_array_equal(ax.get_xticks(), [1, 2, 3])

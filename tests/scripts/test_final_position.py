@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from lic_drake.errors import EstimateError
 from lic_drake.estimate.features import PLANAR_LIC1
 from scripts.unknown_category.final_position import OUTLIERS, FinalPositions
 
@@ -56,28 +55,8 @@ def test_it_comes_near_the_density_that_the_failures_were_drawn_from() -> None:
     assert np.mean(ours) > everywhere - 1.0 + 0.3
 
 
-def test_no_position_can_rule_a_category_out() -> None:
-    final = FinalPositions.fit(PLANAR_LIC1, failures(100))
-    assert final.log_density([0.7, 0.0, 0.0, 0.0], [[-3.0, 5.0]]) == pytest.approx(np.log(OUTLIERS))
-
-
 def test_a_base_carries_all_of_it() -> None:
     here = FinalPositions.fit(PLANAR_LIC1, failures(100))
     there = FinalPositions.fit(PLANAR_LIC1, failures(100, base_y=0.3))
     z, p_RE = [0.7, 0.1, 0.1, 0.3], [[0.5, 0.1]]
     assert there.log_density(z, p_RE) == pytest.approx(here.log_density(z, p_RE), abs=1e-9)
-
-
-def test_reaches_that_never_began_teach_nothing() -> None:
-    columns = failures(100)
-    columns["final_x"][:50] = np.nan
-    assert len(FinalPositions.fit(PLANAR_LIC1, columns).p_RE) == 25
-    columns["success"][:] = True
-    with pytest.raises(EstimateError, match="no failed reach with a final position"):
-        FinalPositions.fit(PLANAR_LIC1, columns)
-
-
-def test_a_single_failure_is_enough_to_have_one() -> None:
-    columns = {name: values[:1] for name, values in failures(2).items()}
-    final = FinalPositions.fit(PLANAR_LIC1, columns)
-    assert np.isfinite(final.log_density([0.7, 0.0, 0.0, 0.0], [[0.5, 0.0]]))

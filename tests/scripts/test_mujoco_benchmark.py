@@ -1,6 +1,5 @@
 import json
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -8,7 +7,7 @@ import pytest
 pytest.importorskip("mujoco")
 
 from scripts.mujoco import run as benchmark_peers
-from scripts.mujoco.tables import engines_table, pairs_table
+from scripts.mujoco.tables import pairs_table
 from scripts.mujoco.timing import Timing
 
 SCENARIO = """
@@ -46,34 +45,11 @@ def cells(table: str, line: int) -> list[str]:
     return [cell.strip() for cell in table.splitlines()[line].strip("|").split("|")]
 
 
-def test_costs_are_medians_over_the_reaches_and_shares_those_of_all_time() -> None:
-    table = engines_table(ROWS, ["A", "B"])
-    assert cells(table, 2) == [
-        "A",
-        "2 of 3",
-        "30",
-        "0.0400",
-        "0.0200",
-        "50",
-        "20",
-        "20",
-        "10",
-        "50",
-    ]
-    assert cells(table, 3)[:5] == ["B", "1 of 3", "30", "0.0100", "0.0050"]
-
-
 def test_ratios_are_medians_of_the_reaches_own_ratios_and_outcomes_are_paired() -> None:
     table = pairs_table(ROWS, [("A", "B")])
     ratio = "3.00 (2.50..3.50)"  # 2, 3 and 4; the ratio of the medians is 4.
     counts = ["1", "1", "0", "1", "1 of 3"]
     assert cells(table, 2) == ["A", "B", ratio, ratio, *counts, "1.00"]
-
-
-def test_reaches_that_never_began_have_no_cost() -> None:
-    never = [replace(row, simulated_s=0.0) if row.reach == 1 else row for row in ROWS]
-    assert cells(pairs_table(never, [("A", "B")]), 2)[2] == "3.00 (2.50..3.50)"
-    assert cells(engines_table(never, ["A"]), 2)[3] == "0.0300"
 
 
 def test_the_script_writes_its_tables_and_every_reach(

@@ -129,19 +129,3 @@ def test_two_objects_are_as_stiff_as_drakes() -> None:
     world.advance(1.0)
     # 20 N less the ground's friction on a spring of 48 kN/m.
     assert world.data.qpos[3] - 0.0005 == pytest.approx((20.0 - AXIS_LIMIT) / 4.8e4, rel=0.1)
-
-
-def test_the_arm_slides_on_an_object_with_a_friction_of_0_4() -> None:
-    R_RL, p_RL = ARM.link_poses(BENT)
-    normal, along = R_RL[2, :, 0], -R_RL[2, :, 1]
-    centre = p_RL[2] + 0.2 * along + 0.025 * normal
-    world = MujocoWorld(BENT, make_clutter(cylinder(*centre[:2])))
-    to_joints = np.linalg.pinv(ARM.tip_jacobian(BENT))
-    world.data.ctrl[:] = BENT + to_joints @ (0.03 * normal)
-    world.advance(3.0)
-    world.data.ctrl[:] = BENT + to_joints @ (0.03 * normal + 0.06 * along)
-    world.advance(0.5)
-    wrench = np.zeros(6)
-    mujoco.mj_contactForce(world.model, world.data, 0, wrench)
-    assert wrench[0] > 1.0
-    assert np.linalg.norm(wrench[1:3]) == pytest.approx(0.4 * wrench[0], rel=0.01)

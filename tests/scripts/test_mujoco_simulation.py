@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.reaches import free_space, reach_request, small_clutter, start_angles
+from support.reaches import free_space, reach_request, start_angles
 from support.worlds import ARM, add_sensor, cylinder, make_clutter, make_world
 
 from lic_drake.reach.environment import simulate
@@ -39,17 +39,6 @@ def test_without_clutter_a_reach_arrives_when_drakes_does(goal: tuple[float, flo
     samples = min(len(mine.trace.q), len(drake.trace.q))
     np.testing.assert_allclose(mine.trace.q[:samples], drake.trace.q[:samples], atol=5e-3)
     assert max(mine.trace.peak_force) == 0.0
-
-
-def test_sleeping_changes_next_to_nothing() -> None:
-    scenario = small_clutter(timeout_s=8.0)
-    asleep, awake = (
-        reach(scenario, start(scenario, environment=2, sleep=sleep), (0.65, -0.1))
-        for sleep in (True, False)
-    )
-    assert asleep.outcome == awake.outcome == "reached"
-    assert max(awake.trace.peak_force) > 0.0
-    np.testing.assert_allclose(asleep.trace.q, awake.trace.q, atol=1e-4)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])

@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 
 from lic_drake.clutter.foliage import FoliageApertureClutter
-from lic_drake.errors import RenderingError, ScenarioError
+from lic_drake.errors import RenderingError
 from lic_drake.perception.config import load_cameras
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.seeds import make_generator
 from scripts.perception.errors import (
     ApertureError,
     GoalError,
-    board_of,
     measure_scene,
     perception_report,
     true_states,
@@ -40,13 +39,6 @@ def test_true_states_are_counted_as_they_were_drawn() -> None:
     for index in range(5):
         states = true_states(clutter, clutter.sample(make_generator("training", "s", index)))
         assert [states.count(s) for s in ("open", "partly", "blocked")] == [11, 4, 5]
-
-
-def test_what_perception_may_know_is_rows_columns_and_size() -> None:
-    _, model = board_of(SCENARIO)
-    assert (model.rows, model.columns, model.aperture_m) == (4, 5, 0.2)
-    with pytest.raises(ScenarioError, match="cylinder-clutter has no board"):
-        board_of(load_scenario("cylinder-clutter"))
 
 
 def test_a_report_has_medians_rates_and_who_was_taken_for_what() -> None:
