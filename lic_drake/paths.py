@@ -27,3 +27,10 @@ def shipped_library(category: str) -> Path:
 def shipped_libraries() -> list[Path]:
     """Returns the folders of all shipped experience libraries, sorted by category."""
     return sorted(path for path in (models_dir() / "experience").iterdir() if path.is_dir())
+
+
+def find_library(name_or_path: str | Path) -> Path:
+    """Returns the path of a library: what exists there, or the shipped one of that name."""
+    path = Path(name_or_path)
+    shipped = shipped_library(path.name)
+    return shipped if path.name == str(path) and not path.exists() and shipped.is_dir() else path

@@ -7,14 +7,16 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
+from tqdm import tqdm
+
 from lic_drake.errors import LibraryError, LicError
-from lic_drake.evaluate.batch import simulate_requests
 from lic_drake.evaluate.table import Table
 from lic_drake.evaluate.trials import TrialTable, read_trials
+from lic_drake.experience.runner import Progress, refuse_failed, simulate
 from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.experience.workers import LocalWorkers
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.rollout import run_reach
-from lic_drake.reach.scenario import Scenario
 
 RESULTS = Path("notebooks/results")
 """Folder of all records, seen from the root of a checkout, where scripts are run."""
@@ -55,27 +57,31 @@ def run_tables(write: Callable[[Path], list[Path]], doc: str | None) -> None:
 
 
 def keep_reaches(
-    requests: Sequence[ReachRequest],
-    folder: Path,
-    scenario: Scenario,
-    workers: int,
-    *,
-    sleep: bool = True,
+    requests: Sequence[ReachRequest], folder: Path, workers: int, *, sleep: bool = True
 ) -> list[ReachRecord]:
     """Returns the records of requests, in their order; those that a folder holds are not run again.
 
     Args:
-        requests: What to simulate.
-        folder: Of the library that keeps the records.
-        scenario: Of all requests.
+        requests: What to simulate, of one scenario.
+        folder: Of the library that keeps the records, at the end as one file.
         workers: Number of processes.
         sleep: Whether untouched objects sleep.
     """
     library = ExperienceLibrary(folder)
-    library.create()
     reach = run_reach if sleep else partial(run_reach, sleep=False)
-    say = partial(print, f"{folder.name}:", flush=True)
-    found = simulate_requests(requests, library, scenario, workers, say, reach)
+    ordered = sorted(requests, key=lambda request: (request.stream, request.environment))
+    with (
+        LocalWorkers(workers) as pool,
+        tqdm(desc=folder.name, total=len(ordered), unit="reaches") as bar,
+    ):
+
+        def show(progress: Progress) -> None:
+            bar.update(progress.done - bar.n)
+
+        report = simulate(ordered, library, pool, reach=reach, progress=show)
+    refuse_failed(report.failed)
+    library.compact()
+    found = {record.key: record for record in library.records()}
     return [found[request.key] for request in requests]
 
 

@@ -18,7 +18,7 @@ from support.reaches import free_space, reach_request, small_clutter
 from support.worlds import box, cylinder, make_clutter
 
 from lic_drake.control.mpc import HapticMpc
-from lic_drake.evaluate.batch import random_requests
+from lic_drake.evaluate.trial import random_requests
 from lic_drake.reach import environment as reach_environment
 from lic_drake.reach import rollout, simulation_pool
 from lic_drake.reach.diagram import ReachDiagram, make_reach_diagram

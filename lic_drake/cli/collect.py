@@ -3,21 +3,24 @@
 import argparse
 import json
 import math
-import multiprocessing
 import os
 import shlex
 import sys
-from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from lic_drake.cli import exit_codes
-from lic_drake.cli.arguments import Subparsers, add_json_argument, positive_int
+from lic_drake.cli.arguments import (
+    Subparsers,
+    add_json_argument,
+    add_workers_arguments,
+    workers_of,
+)
 from lic_drake.cli.progress import ProgressDisplay
 
 if TYPE_CHECKING:
-    from lic_drake.experience.collect import CollectionReport
-    from lic_drake.experience.grid import CollectionRequest
+    from lic_drake.experience.collect import CollectionRequest
+    from lic_drake.experience.runner import Report
 
 DEFAULT_SCENARIO = "cylinder-clutter"
 """Scenario of a new library when none is asked for."""
@@ -60,21 +63,9 @@ def add_parser(subparsers: Subparsers) -> None:
         help="seed stream of the environments: training, evaluation, calibration or holdout"
         " (default: training)",
     )
+    add_workers_arguments(parser)
     parser.add_argument(
-        "--workers",
-        metavar="N",
-        type=positive_int,
-        help="number of environments at work at a time; a process takes 200 MB of memory (default:"
-        " CPU count, or all workers of the scheduler)",
-    )
-    parser.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="simulate on the workers of a Dask scheduler, for instance tcp://node1:8786 (default:"
-        " in processes on this machine)",
-    )
-    parser.add_argument(
-        "--shard",
+        "--share",
         metavar="K/N",
         default="1/1",
         help="simulate only the K-th of N shares of the environments, side by side with the other"
@@ -99,41 +90,30 @@ def add_parser(subparsers: Subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Collects; returns 0 when the library is complete, 1 when environments failed."""
     from lic_drake.experience.collect import collect
-    from lic_drake.experience.shard import Shard
-    from lic_drake.experience.store import ExperienceLibrary
+    from lic_drake.experience.store import ExperienceLibrary, Share
 
-    request = _make_request(args)
-    shard = Shard.parse(args.shard)
-    indices = shard.share(request.environment_indices)
-    goals, starts, total = (
-        len(request.goals()),
-        len(request.starts()),
-        request.num_reaches(indices),
-    )
-    about = "" if total == len(indices) * goals * starts else "about "
+    request, share = _make_request(args), Share.parse(args.share)
+    environments = len(share.of(request.environment_indices))
+    goals, starts, total = len(request.goals()), len(request.starts()), request.num_reaches(share)
+    about = "" if total == environments * goals * starts else "about "
     print(
-        f"{request.scenario.category}: {len(indices)} environments x {goals} goals x"
+        f"{request.scenario.category}: {environments} environments x {goals} goals x"
         f" {about}{starts} starts = {total} reaches into {args.library}",
         file=_remarks(args),
         flush=True,
     )
     try:
-        with ExitStack() as stack:
-            where = _where(args, stack)
-            display = stack.enter_context(ProgressDisplay(_remarks(args)))
+        with workers_of(args) as workers, ProgressDisplay(_remarks(args)) as display:
             report = collect(
                 ExperienceLibrary(args.library),
                 request,
-                shard=shard,
+                workers,
+                share=share,
                 progress=display.show,
-                **where,
             )
     except KeyboardInterrupt:
-        # A second Ctrl-C does not wait for the running reaches.
-        for process in multiprocessing.active_children():
-            process.kill()
         print(
-            f"lic: stopped; finished reaches are kept, go on with: {_same_command(args)}",
+            f"lic: stopped; finished environments are kept, go on with: {_same_command(args)}",
             file=sys.stderr,
         )
         return exit_codes.INTERRUPTED
@@ -145,39 +125,19 @@ def _remarks(args: argparse.Namespace) -> TextIO:
     return sys.stderr if args.json else sys.stdout
 
 
-def _where(args: argparse.Namespace, stack: ExitStack) -> dict[str, Any]:
-    """Returns the arguments of `collect` that say where reaches are simulated."""
-    if args.scheduler is None:
-        return {"workers": args.workers or os.cpu_count() or 1}
-    from lic_drake.experience.cluster import Cluster
-
-    cluster = stack.enter_context(Cluster(args.scheduler))
-    if cluster.num_workers() == 0:
-        print(
-            "lic: the scheduler has no workers yet, waiting for some; start them with:"
-            f" dask worker {args.scheduler} --nworkers -1 --nthreads 1",
-            file=sys.stderr,
-        )
-    most = args.workers or sys.maxsize
-    return {
-        "workers": lambda: min(most, cluster.num_workers()),
-        "make_executor": cluster.make_executor,
-    }
-
-
 def _same_command(args: argparse.Namespace) -> str:
     """Returns the command that goes on with a library."""
     command = ["lic", "collect", str(args.library)]
     if args.scheduler is not None:
         command += ["--scheduler", args.scheduler]
-    if args.shard != "1/1":
-        command += ["--shard", args.shard]
+    if args.share != "1/1":
+        command += ["--share", args.share]
     return shlex.join(command)
 
 
 def _make_request(args: argparse.Namespace) -> "CollectionRequest":
     """Returns what the options ask for; what they leave open is as the library has it."""
-    from lic_drake.experience.grid import REQUEST_FILE, CollectionRequest, read_request
+    from lic_drake.experience.collect import REQUEST_FILE, CollectionRequest, read_request
     from lic_drake.reach.scenario import load_scenario
 
     path = args.library / REQUEST_FILE
@@ -195,7 +155,7 @@ def _make_request(args: argparse.Namespace) -> "CollectionRequest":
     return CollectionRequest(**{**(vars(stored) if stored else {}), **values})
 
 
-def _conclude(report: "CollectionReport", args: argparse.Namespace) -> int:
+def _conclude(report: "Report", args: argparse.Namespace) -> int:
     """Prints the result and returns the exit code."""
     from lic_drake.intervals import wilson_interval
 
@@ -211,7 +171,7 @@ def _conclude(report: "CollectionReport", args: argparse.Namespace) -> int:
             "successes": progress.successes,
             "success_interval": [low, high] if progress.done else None,
             "elapsed_s": progress.elapsed_s,
-            "failed": {str(task.environment): task.reason for task in report.failed},
+            "failed": {task.name: task.reason for task in report.failed},
         }
         print(json.dumps(values))
     else:
@@ -222,7 +182,7 @@ def _conclude(report: "CollectionReport", args: argparse.Namespace) -> int:
             f" (90 % interval {low:.1%} to {high:.1%})"
         )
     for failed in report.failed:
-        print(f"lic: environment {failed.environment} failed: {failed.reason}", file=sys.stderr)
+        print(f"lic: environment {failed.name} failed: {failed.reason}", file=sys.stderr)
     if progress.done < progress.total:
         print("lic: the library is incomplete; run the same command to try again", file=sys.stderr)
         return exit_codes.INCOMPLETE

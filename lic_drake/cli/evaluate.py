@@ -2,15 +2,17 @@
 
 import argparse
 import json
-import os
 import sys
 from pathlib import Path
 
+from lic_drake.cli import exit_codes
 from lic_drake.cli.arguments import (
     Subparsers,
     add_json_argument,
     add_library_argument,
+    add_workers_arguments,
     positive_int,
+    workers_of,
 )
 
 
@@ -41,7 +43,6 @@ def add_parser(subparsers: Subparsers) -> None:
         ("--environments", 200, "number of environments"),
         ("--goals", 1, "goals in each"),
         ("--attempts", 2, "attempts at a goal at the most"),
-        ("--workers", os.cpu_count() or 1, "number of processes; the default is one a core"),
     ):
         parser.add_argument(
             name,
@@ -107,6 +108,7 @@ def add_parser(subparsers: Subparsers) -> None:
         metavar="NAME",
         help="name of these trials beside others in the same folder (default: none)",
     )
+    add_workers_arguments(parser)
     add_library_argument(parser)
     add_json_argument(parser)
     parser.set_defaults(run=run)
@@ -137,9 +139,18 @@ def run(args: argparse.Namespace) -> int:
         cameras=args.cameras,
     )
     remarks = sys.stderr if args.json else sys.stdout
-    rows = run_evaluation(
-        evaluation, args.workers, say=lambda line: print(line, file=remarks, flush=True)
-    )
+    try:
+        with workers_of(args) as workers:
+            rows = run_evaluation(
+                evaluation, workers, say=lambda line: print(line, file=remarks, flush=True)
+            )
+    except KeyboardInterrupt:
+        print(
+            "lic: stopped; reaches of finished environments are kept, run the same command to go"
+            " on",
+            file=sys.stderr,
+        )
+        return exit_codes.INTERRUPTED
     rates = summarize_trials(TrialTable(rows), args.attempts, args.variant)
     if args.json:
         print(json.dumps({"trials": str(evaluation.trials_path), "rates": rates_to_dicts(rates)}))

@@ -9,8 +9,8 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lic_drake.cli import add_to_library, exit_codes
-from lic_drake.cli.arguments import Subparsers, add_json_argument, positive_int
+from lic_drake.cli import exit_codes
+from lic_drake.cli.arguments import Subparsers, add_json_argument, library_path, positive_int
 
 if TYPE_CHECKING:
     from lic_drake.experience.check import LibraryReport
@@ -23,51 +23,33 @@ def add_parser(subparsers: Subparsers) -> None:
         "experience",
         help="look at, check, recompute, merge or add to experience libraries",
         description="Looks at, checks, recomputes, merges or adds to experience libraries: folders"
-        " of Parquet files with one row per reach, which also open in pandas.",
-        epilog="example: lic experience info out/cylinder",
+        " of Parquet files with one row per reach, which also open in pandas. A shipped library"
+        " goes by its name.",
+        epilog="example: lic experience info cylinder-clutter",
     )
     actions = parser.add_subparsers(title="actions", metavar="ACTION", required=True)
-    _add_info(actions)
-    _add_check(actions)
-    _add_recompute(actions)
-    _add_merge(actions)
-    add_to_library.add_parser(actions)
-
-
-def _add_info(actions: Subparsers) -> None:
-    parser = actions.add_parser(
+    info = actions.add_parser(
         "info",
         help="summarize a library",
         description="Prints the size, success rate with 90 % Wilson interval, outcomes and origin"
         " of a library.",
         epilog="example: lic experience info out/cylinder --json",
     )
-    _add_library(parser)
-    add_json_argument(parser)
-    parser.set_defaults(run=run_info)
-
-
-def _add_check(actions: Subparsers) -> None:
-    parser = actions.add_parser(
+    _add_library(info)
+    add_json_argument(info)
+    info.set_defaults(run=run_info)
+    check = actions.add_parser(
         "check",
         help="say what is there, what is missing and what is damaged",
         description="Reads every file of a library in full and says what to do. Exit code 1 if a"
-        " file is damaged, a reach is there twice, scenarios are mixed, or a reach is missing.",
+        " file is damaged, a reach is there twice, scenarios are mixed, or a reach is missing that"
+        " lic collect was asked for.",
         epilog="example: lic experience check out/cylinder",
     )
-    _add_library(parser)
-    parser.add_argument(
-        "--request",
-        metavar="FILE",
-        type=Path,
-        help="collection request that the library must fulfil (default: the library's own)",
-    )
-    add_json_argument(parser)
-    parser.set_defaults(run=run_check)
-
-
-def _add_recompute(actions: Subparsers) -> None:
-    parser = actions.add_parser(
+    _add_library(check)
+    add_json_argument(check)
+    check.set_defaults(run=run_check)
+    recompute = actions.add_parser(
         "recompute",
         help="simulate random rows again and compare them bit for bit",
         description="Simulates random rows of a library again. Exit code 1 if any differs in any"
@@ -75,40 +57,80 @@ def _add_recompute(actions: Subparsers) -> None:
         " other processors round otherwise.",
         epilog="example: lic experience recompute out/cylinder --rows 200",
     )
-    _add_library(parser)
-    parser.add_argument(
+    _add_library(recompute)
+    recompute.add_argument(
         "--rows",
         metavar="N",
         type=positive_int,
         default=100,
-        help="number of rows to simulate (default: %(default)s)",
+        help="number of rows to simulate, all if there are fewer (default: %(default)s)",
     )
-    parser.add_argument(
+    recompute.add_argument(
         "--seed", metavar="N", type=int, default=0, help="draws the rows (default: %(default)s)"
     )
-    parser.set_defaults(run=run_recompute)
-
-
-def _add_merge(actions: Subparsers) -> None:
-    parser = actions.add_parser(
+    recompute.set_defaults(run=run_recompute)
+    merge = actions.add_parser(
         "merge",
         help="merge libraries of one scenario into one file",
-        description="Writes all reaches of libraries of one scenario into one Parquet file, which"
-        " is a library of its own. Equal duplicates are written once, unequal ones refused."
-        " Records that were added from elsewhere stay where they are.",
+        description="Writes all rows of libraries of one scenario into one Parquet file, which is"
+        " a library of its own. Equal duplicates are written once, unequal ones refused.",
         epilog="example: lic experience merge out/all.parquet out/machine-1 out/machine-2",
     )
-    parser.add_argument("output", metavar="OUTPUT", type=Path, help="new .parquet file")
-    parser.add_argument(
-        "sources", metavar="LIBRARY", type=Path, nargs="+", help="folder or file of a library"
+    merge.add_argument("output", metavar="OUTPUT", type=Path, help="new .parquet file")
+    merge.add_argument(
+        "sources", metavar="LIBRARY", type=library_path, nargs="+", help="folder, file or name"
     )
-    parser.set_defaults(run=run_merge)
+    merge.set_defaults(run=run_merge)
+    _add_add(actions)
+
+
+def _add_add(actions: Subparsers) -> None:
+    parser = actions.add_parser(
+        "add",
+        help="add rows of a real or another simulated robot to a library",
+        description="Adds rows of a real or another simulated robot to a library, as a file of"
+        " their own with a source and a weight. Whatever learns from the library learns from them,"
+        " too. They come from a CSV or Parquet file with columns named as those of the library, in"
+        " SI units and radians: in the plane success, goal_x, goal_y, start_y, start_phi, and if"
+        " known start_x, base_x, base_y, environment, final_x, final_y, final_phi, final_vx,"
+        " final_vy; for the PR2 also goal_z, start_x, start_z, base_y, torso and the quaternion"
+        " start_qw to start_qz instead of start_phi. All rows are checked before anything is"
+        " written.",
+        epilog="example: lic experience add out/mine lab.csv --source lab-arm --weight 4",
+    )
+    parser.add_argument("library", metavar="LIBRARY", type=Path, help="folder of the library")
+    parser.add_argument("file", metavar="FILE", type=Path, help=".csv or .parquet file of rows")
+    parser.add_argument(
+        "--source",
+        metavar="NAME",
+        required=True,
+        help="who made the rows, for instance lab-arm (no default: must be given)",
+    )
+    parser.add_argument(
+        "--weight",
+        metavar="W",
+        type=_number,
+        default=1,
+        help="how many simulated reaches a row counts as, 0.001 to 1000 (default: %(default)s)",
+    )
+    add_json_argument(parser)
+    parser.set_defaults(run=run_add)
 
 
 def _add_library(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "library", metavar="LIBRARY", type=Path, help="folder or .parquet file of the library"
+        "library",
+        metavar="LIBRARY",
+        type=library_path,
+        help="folder or .parquet file of the library, or name of a shipped one",
     )
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"needs a number, got {text!r}") from None
 
 
 def run_info(args: argparse.Namespace) -> int:
@@ -119,7 +141,6 @@ def run_info(args: argparse.Namespace) -> int:
     summary = summarize(ExperienceLibrary(args.library))
     if args.json:
         values = {**dataclasses.asdict(summary), "success_rate": summary.success_rate}
-        values["added"] = [addition.values() for addition in summary.added]
         print(json.dumps(values, indent=2))
     else:
         print("\n".join(_lines(args.library, summary)))
@@ -129,16 +150,16 @@ def run_info(args: argparse.Namespace) -> int:
 def run_check(args: argparse.Namespace) -> int:
     """Prints what a library holds and lacks; returns 1 if anything is wrong."""
     from lic_drake.experience.check import check_library
-    from lic_drake.experience.grid import REQUEST_FILE, read_request
+    from lic_drake.experience.collect import REQUEST_FILE, read_request
     from lic_drake.experience.store import ExperienceLibrary
 
-    path = args.request or args.library / REQUEST_FILE
-    request = read_request(path) if args.request or os.path.exists(path) else None
+    path = args.library / REQUEST_FILE
+    request = read_request(path) if os.path.exists(path) else None
     report = check_library(ExperienceLibrary(args.library), request)
     if args.json:
         print(json.dumps({**dataclasses.asdict(report), "is_sound": report.is_sound}, indent=2))
-        return 0 if report.is_sound else exit_codes.INCOMPLETE
-    print("\n".join(_check_lines(report, args.library, is_own=not args.request)))
+    else:
+        print("\n".join(_check_lines(report, args.library)))
     return 0 if report.is_sound else exit_codes.INCOMPLETE
 
 
@@ -147,35 +168,54 @@ def run_recompute(args: argparse.Namespace) -> int:
     import numpy as np
     from tqdm import tqdm
 
-    from lic_drake.experience.recompute import recompute
+    from lic_drake.experience.check import recompute
     from lic_drake.experience.store import ExperienceLibrary
 
-    library, rng = ExperienceLibrary(args.library), np.random.default_rng(args.seed)
     with tqdm(total=args.rows, disable=None, unit="rows") as bar:
-        differing = recompute(library, args.rows, rng, progress=lambda _: bar.update())
-    print(f"{args.rows - len(differing)} of {args.rows} rows are the same to the last bit")
-    for row in differing:
+
+        def show(done: int, total: int) -> None:
+            bar.total, bar.n = total, done
+            bar.refresh()
+
+        library, rng = ExperienceLibrary(args.library), np.random.default_rng(args.seed)
+        found = recompute(library, args.rows, rng, progress=show)
+    print(f"{found.rows - len(found.differing)} of {found.rows} rows are the same to the last bit")
+    for row in found.differing:
         print(f"{row.key}: {' -> '.join(row.outcomes)}, other {', '.join(row.fields)}")
-    return exit_codes.INCOMPLETE if differing else 0
+    return exit_codes.INCOMPLETE if found.differing else 0
 
 
 def run_merge(args: argparse.Namespace) -> int:
     """Merges libraries."""
-    from lic_drake.experience.merge import merge_libraries
-    from lic_drake.experience.store import ExperienceLibrary
+    from lic_drake.experience.store import ExperienceLibrary, merge_libraries
 
     rows = merge_libraries([ExperienceLibrary(path) for path in args.sources], args.output)
     print(f"{rows} reaches in {args.output}")
     return 0
 
 
-def _check_lines(report: "LibraryReport", library: Path, is_own: bool) -> list[str]:
+def run_add(args: argparse.Namespace) -> int:
+    """Adds the rows of a file."""
+    from lic_drake.experience.add import add_file
+    from lic_drake.experience.store import ExperienceLibrary
+
+    library = ExperienceLibrary(args.library)
+    rows = add_file(library, args.file, source=args.source, weight=args.weight)
+    successes, path = sum(row.success for row in rows), library.shard_path(rows[0].stream)
+    if args.json:
+        print(json.dumps({"rows": len(rows), "successes": successes, "path": str(path)}))
+    else:
+        print(
+            f"added {len(rows)} rows of {args.source}, {successes} at the goal, each with the"
+            f" weight of {args.weight:g} simulated reaches: {path}"
+        )
+    return 0
+
+
+def _check_lines(report: "LibraryReport", library: Path) -> list[str]:
     """Returns the lines of a report; the last one is the verdict, with what to do."""
     lines = [
         f"reaches     {report.reaches} in {report.shards} files",
-        f"journals    {report.journalled} more reaches of tasks at work or interrupted"
-        + (f"; {report.lost_lines} damaged lines" if report.lost_lines else ""),
-        *([f"added       {report.added} records from elsewhere"] if report.added else []),
         f"missing     {_missing(report)}",
         f"scenarios   {', '.join(report.scenarios) or 'none'}",
         f"duplicates  {len(report.duplicates)} {' '.join(report.duplicates[:5])}".rstrip(),
@@ -194,7 +234,7 @@ def _check_lines(report: "LibraryReport", library: Path, is_own: bool) -> list[s
     elif report.duplicates:
         lines.append("DUPLICATES; merge into a new library: lic experience merge --help")
     elif report.missing:
-        lines.append(f"INCOMPLETE; go on with: {go_on}" if is_own else "INCOMPLETE")
+        lines.append(f"INCOMPLETE; go on with: {go_on}")
     else:
         lines.append("sound" if report.requested is None else "complete")
     return lines
@@ -222,7 +262,7 @@ def _lines(library: Path, summary: "LibrarySummary") -> list[str]:
     return [
         f"library       {library} ({summary.shards} shards)",
         f"scenario      {summary.category}, {summary.robot}, digest {summary.scenario}",
-        f"reaches       {summary.reaches}, and {summary.journalled} in journals",
+        f"reaches       {summary.reaches}",
         f"grid          {summary.environments} environments ({', '.join(summary.streams)}),"
         f" {summary.goals} goals, {summary.starts} starts",
         f"success       {summary.successes} of {summary.reaches} = {summary.success_rate:.1%}"
@@ -232,5 +272,9 @@ def _lines(library: Path, summary: "LibrarySummary") -> list[str]:
         f" {summary.wall_time_s / 3600.0:.3g} h of wall time",
         f"simulated by  lic_drake {', '.join(summary.lic_drake_versions)};"
         f" Drake {', '.join(summary.drake_versions)}",
-        *(f"added         {addition.describe()}" for addition in summary.added),
+        *(
+            f"added         {added.reaches} rows of {added.source}, {added.successes} at the goal,"
+            f" weight {' or '.join(f'{weight:g}' for weight in added.weights)}"
+            for added in summary.added
+        ),
     ]

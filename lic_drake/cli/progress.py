@@ -4,7 +4,7 @@ import sys
 from typing import TYPE_CHECKING, Self, TextIO
 
 if TYPE_CHECKING:
-    from lic_drake.experience.progress import Progress
+    from lic_drake.experience.runner import Progress
 
 LOG_EVERY_S = 60.0
 """Time between two lines in a log, seconds."""
@@ -21,9 +21,7 @@ class ProgressDisplay:
         from tqdm import tqdm
 
         # None: off where the output is no terminal.
-        self._bar = tqdm(
-            disable=None, bar_format="{percentage:3.0f}%|{bar}| {n_fmt}/{total_fmt}{postfix}"
-        )
+        self._bar = tqdm(disable=None, bar_format="{percentage:3.0f}%|{bar}{postfix}")
         self._log = log
         self._next_line_s = LOG_EVERY_S
 
@@ -37,17 +35,7 @@ class ProgressDisplay:
         """Shows how far the collection is."""
         if not self._bar.disable:
             self._bar.total, self._bar.n = progress.total, progress.done
-            self._bar.set_postfix_str(_describe(progress))
+            self._bar.set_postfix_str(progress.describe())
         elif progress.elapsed_s >= self._next_line_s:
-            line = f"{progress.done}/{progress.total} reaches, {_describe(progress)}"
-            print(line, file=self._log or sys.stdout, flush=True)
+            print(progress.describe(), file=self._log or sys.stdout, flush=True)
             self._next_line_s = progress.elapsed_s + LOG_EVERY_S
-
-
-def _describe(progress: "Progress") -> str:
-    left = progress.time_left_s
-    clock = "?" if left is None else f"{int(left) // 3600}:{int(left) // 60 % 60:02d} h"
-    return (
-        f"{progress.successes} successes, {progress.reaches_per_minute:.0f} reaches/min with"
-        f" {progress.at_work} at work, {clock} left"
-    )

@@ -59,7 +59,6 @@ def run(args: argparse.Namespace) -> int:
     import numpy as np
 
     from lic_drake.errors import RequestError
-    from lic_drake.experience.added import added_columns
     from lic_drake.experience.store import ExperienceLibrary
     from lic_drake.paths import shipped_library
     from lic_drake.reach.request import check_goal
@@ -84,14 +83,7 @@ def run(args: argparse.Namespace) -> int:
     failed = tuple(_failed_start(scenario, starts, *numbers) for numbers in args.failed)
     situation = Situation(p_WG=p_WG, starts=starts, failed=failed)
     rng = np.random.default_rng(args.seed)
-    selector = make_selector(
-        args.method,
-        scenario.arm(),
-        library.columns(),
-        rng,
-        scenario.category,
-        added=added_columns(library),
-    )
+    selector = make_selector(args.method, scenario.arm(), library.columns(), rng, scenario.category)
     chosen = selector.select(situation)
     x0, b0, q = chosen.start.x0, chosen.start.b0, chosen.start.q
     assert q is not None

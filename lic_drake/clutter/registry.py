@@ -30,7 +30,7 @@ class Category:
         sampler: The dataclass of its parameters.
         in_space: Whether hands and goals are in space, else in the plane.
         observed: What the first reach showed, the paper's o: columns of
-            `lic_drake.experience.second_reach` that LIC-2 takes as features. None: there is no
+            `lic_drake.experience.pairs` that LIC-2 takes as features. None: there is no
             LIC-2, and further starts are LIC-1's best away from the failed ones.
     """
 

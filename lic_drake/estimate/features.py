@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lic_drake.clutter.registry import get_category
 from lic_drake.errors import EstimateError
-from lic_drake.experience.second_reach import FIRST_PREFIX, SHOWN
+from lic_drake.experience.pairs import FIRST_PREFIX, SHOWN
 from lic_drake.types import BoolVector, IntVector, Vector
 
 _GOAL = ("goal_x", "goal_y", "goal_z")
@@ -68,7 +68,7 @@ class FeatureMap:
             start_y, start_phi, or in space of start_x, start_y, start_z and the quaternion
             start_qw, start_qx, start_qy, start_qz, metres and radians.
         observed: Columns of what the first reach showed, for LIC-2: "first_" before names of
-            `lic_drake.experience.second_reach.SHOWN`, metres, radians and m/s.
+            `lic_drake.experience.pairs.SHOWN`, metres, radians and m/s.
         relative: Whether each goal column is replaced by its difference from the start: the first
             start column minus the first goal column, and so on. LIC-1 only.
     """
@@ -139,7 +139,7 @@ class FeatureMap:
 
         Args:
             columns: Arrays of equal length named as the fields of `ReachRecord`; with observed
-                features those of `lic_drake.experience.second_reach.pair_reaches`. Defaults: 0 for
+                features those of `lic_drake.experience.pairs.pair_reaches`. Defaults: 0 for
                 base_x, base_y and torso, 1 for weight, "simulation" for source.
 
         Raises:
@@ -195,7 +195,7 @@ class FeatureMap:
 
         Args:
             first: What the first reach showed, in W, by the names of
-                `lic_drake.experience.second_reach.SHOWN`, metres, radians and m/s.
+                `lic_drake.experience.pairs.SHOWN`, metres, radians and m/s.
             b0: Place (x, y) of the base and height of the torso in the second reach, shape
                 (..., 3), metres.
 

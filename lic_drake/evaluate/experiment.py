@@ -1,24 +1,25 @@
-"""Trials of several strategies on the same unseen environments, in parallel and resumable."""
+"""Trials of several strategies on the same unseen environments; an environment is a task."""
 
 import gc
 import time
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
-from multiprocessing import get_context
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
+from uuid import uuid4
 
 import numpy as np
 
-from lic_drake.errors import LibraryError, LicError
+from lic_drake.errors import LibraryError
 from lic_drake.evaluate.trial import Attempt, run_trial
 from lic_drake.evaluate.trials import TrialRow, read_trials, write_trials
-from lic_drake.experience.added import added_columns
-from lic_drake.experience.real_pairs import pair_real_attempts
+from lic_drake.experience.pairs import pair_second_attempts
+from lic_drake.experience.runner import Task, add_to_shard, refuse_failed, run_tasks, shard_name
 from lic_drake.experience.schema import scenario_text
 from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.experience.workers import prepare_worker
-from lic_drake.perception.config import load_cameras
+from lic_drake.experience.workers import ThisProcess, Workers
+from lic_drake.perception.config import CamerasConfig, load_cameras
 from lic_drake.perception.observer import Observer
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.rollout import run_reach
@@ -35,8 +36,8 @@ from lic_drake.select.registry import (
 )
 from lic_drake.types import Vector
 
-REACHES_A_BLOCK = 60
-"""About this many reaches make a unit of work: what an interruption can cost each worker."""
+SAY_S = 5.0
+"""Time between two lines about the progress, seconds."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,23 +110,24 @@ class Evaluation:
 
 
 def run_evaluation(
-    evaluation: Evaluation, workers: int = 1, say: Callable[[str], None] = print
+    evaluation: Evaluation, workers: Workers | None = None, say: Callable[[str], None] = print
 ) -> list[TrialRow]:
     """Runs every strategy on the same goals in the same environments.
 
-    Reaches are kept and not simulated again; selections are made anew, so that the trials always
-    are those of the present strategies and libraries.
+    Reaches are kept, a shard for each environment, and not simulated again; selections are made
+    anew, so that the trials always are those of the present strategies and libraries.
 
     Args:
         evaluation: What is to be tried.
-        workers: Number of processes.
+        workers: Where to run it; by default in this process.
         say: Gets a line now and then.
 
     Returns:
         The rows of these trials; the file keeps those of other variants and strategies, too.
 
     Raises:
-        LicError: A method is unknown, or a library cannot be read or written.
+        LicError: A method is unknown, a library cannot be read or written, or an environment
+            failed; reaches of finished environments are kept.
     """
     for method in evaluation.methods:
         check_method(method)
@@ -139,34 +141,45 @@ def run_evaluation(
             f" {evaluation.overrides or 'as it is'}); choose another"
             " folder for the results"
         )
-    blocks = _blocks(evaluation)
-    # Threads of linear algebra in this process would be inherited by nobody and help nobody.
-    executor = ProcessPoolExecutor(
-        workers,
-        mp_context=get_context("forkserver"),
-        initializer=_begin_worker,
-        initargs=(evaluation,),
-    )
-    began = time.perf_counter()
+    plan = _Plan.of(evaluation, scenario)
+    first = evaluation.first_environment
+    environments = range(first, first + evaluation.environments)
+    began_s = time.perf_counter()
+    next_say_s, done, simulated = began_s, 0, 0
     rows: list[TrialRow] = []
-    done = simulated = 0
-    try:
-        for future in as_completed([executor.submit(_run_block, block) for block in blocks]):
-            new_rows, new_records = future.result()
-            if new_records:
-                library.write_shard(f"new-{new_records[0].key}", new_records, scenario)
-            rows += new_rows
-            done += 1
-            simulated += len(new_records)
-            elapsed = time.perf_counter() - began
+
+    def finish(task: Task, result: tuple[list[TrialRow], list[ReachRecord]]) -> None:
+        nonlocal done, simulated
+        new_rows, records = result
+        if records:
+            add_to_shard(library, task.name, records, scenario)
+        rows.extend(new_rows)
+        done += 1
+        simulated += len(records)
+
+    def report(at_work: int) -> None:
+        nonlocal next_say_s
+        now_s = time.perf_counter()
+        if done and (now_s >= next_say_s or done == len(environments)):
+            next_say_s, elapsed_s = now_s + SAY_S, now_s - began_s
             say(
-                f"  {done}/{len(blocks)} blocks, {len(rows)} attempts, {_first_rates(rows)};"
-                f" {60 * simulated / elapsed:.0f} reaches a minute,"
-                f" {elapsed * (len(blocks) - done) / done:.0f} s left; kept in {library.path}"
+                f"  {done}/{len(environments)} environments, {len(rows)} attempts,"
+                f" {_first_rates(rows)}; {60 * simulated / elapsed_s:.0f} reaches a minute,"
+                f" {elapsed_s * (len(environments) - done) / done:.0f} s left; kept in"
+                f" {library.path}"
             )
-    finally:
-        executor.shutdown(cancel_futures=True)
-    library.compact()
+
+    with library.locked():
+        known: defaultdict[int, list[ReachRecord]] = defaultdict(list)
+        for record in library.records() if library.shard_paths() else []:
+            known[record.environment].append(record)
+        tasks = (
+            Task(shard_name(evaluation.stream, i), (plan, i, known.pop(i, [])))
+            for i in environments
+        )
+        failed = run_tasks(tasks, _try_environment, workers or ThisProcess(), finish, report)
+        refuse_failed(failed)
+        library.compact()
     rows.sort(key=lambda row: (row.method, row.environment, row.goal, row.attempt))
     others = read_trials(evaluation.trials_path) if evaluation.trials_path.exists() else []
     write_trials(evaluation.trials_path, [*(o for o in others if not _is_of(o, evaluation)), *rows])
@@ -186,125 +199,99 @@ def _first_rates(rows: Sequence[TrialRow]) -> str:
     return ", ".join(parts)
 
 
-def _blocks(evaluation: Evaluation) -> list[range]:
-    """Returns the environments in units of work."""
-    each = evaluation.goals * len(evaluation.methods) * 1.5
-    size = max(1, round(REACHES_A_BLOCK / each))
-    first, last = evaluation.first_environment, evaluation.first_environment
-    last += evaluation.environments
-    return [range(i, min(i + size, last)) for i in range(first, last, size)]
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Plan:
+    """What workers need, wherever they are; equal to nothing but itself and its copies.
 
+    Attributes:
+        name: Different for each run of an evaluation.
+        evaluation: What is to be tried, with absolute paths.
+        scenario: The scenario that is tried.
+        cameras: Cameras that have to find apertures and goal.
+    """
 
-class _Worker:
-    """What a process keeps between blocks: fitted strategies and the reaches known so far."""
+    name: str
+    evaluation: Evaluation
+    scenario: Scenario
+    cameras: CamerasConfig | None
 
-    def __init__(self, evaluation: Evaluation) -> None:
-        self._evaluation = evaluation
-        experience = ExperienceLibrary(evaluation.experience)
-        self.scenario = evaluation.scenario()
-        self._columns, self._added = experience.columns(), added_columns(experience)
-        self._pairs = None
-        if evaluation.second_attempts is not None:
-            attempts = ExperienceLibrary(evaluation.second_attempts)
-            self._pairs = pair_real_attempts(attempts.columns())
-        self._selectors: dict[str, Selector] = {}
-        self._cameras = load_cameras(evaluation.cameras) if evaluation.cameras else None
-        library = evaluation.reaches
-        self._known = {r.key: r for r in library.records()} if library.shard_paths() else {}
-        self.new: list[ReachRecord] = []
-
-    def run(self, environments: range) -> Iterator[tuple[str, int, int, list[Attempt], bool]]:
-        """Yields method, environment, goal, attempts and success of each trial."""
-        evaluation = self._evaluation
-        for environment in environments:
-            for goal in range(evaluation.goals):
-                at = evaluation.first_environment if evaluation.common_goals else environment
-                p_WG = self.scenario.sample_goal(evaluation.stream, at, goal)
-                observer = self._observer(environment, p_WG)
-                for method in evaluation.methods:
-                    attempts = run_trial(
-                        self.scenario,
-                        self._selector(method, environment, goal),
-                        evaluation.stream,
-                        environment,
-                        p_WG,
-                        evaluation.attempts,
-                        fresh=evaluation.fresh,
-                        moves=evaluation.moves,
-                        reach=self._reach,
-                        look=observer,
-                    )
-                    last = attempts[-1].record
-                    won = last.success if observer is None else observer.touches_ball(last)
-                    yield method, environment, goal, attempts, won
-                if observer is not None:
-                    # A renderer takes 150 MB, and its diagram is a reference cycle: only the
-                    # collector frees it.
-                    del observer
-                    gc.collect()
-
-    def _observer(self, environment: int, p_WG: Vector) -> Observer | None:
-        """Returns the observer of an environment; all strategies see the same images."""
-        if self._cameras is None:
-            return None
-        return Observer(
-            scenario=self.scenario,
-            stream=self._evaluation.stream,
-            environment=environment,
-            p_WG=p_WG,
-            cameras=self._cameras,
-            moves=self._evaluation.moves,
+    @classmethod
+    def of(cls, evaluation: Evaluation, scenario: Scenario) -> "_Plan":
+        attempts = evaluation.second_attempts
+        return cls(
+            name=uuid4().hex,
+            evaluation=replace(
+                evaluation,
+                experience=evaluation.experience.absolute(),
+                second_attempts=attempts and attempts.absolute(),
+            ),
+            scenario=scenario,
+            cameras=load_cameras(evaluation.cameras) if evaluation.cameras else None,
         )
 
-    def _selector(self, method: str, environment: int, goal: int) -> Selector:
+    def __hash__(self) -> int:
+        return hash(self.name)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Plan) and self.name == other.name
+
+
+class _Strategies:
+    """The strategies of an evaluation, each fitted when it is first asked for."""
+
+    def __init__(self, plan: _Plan) -> None:
+        self._plan = plan
+        self._columns = ExperienceLibrary(plan.evaluation.experience).columns()
+        self._pairs = None
+        if plan.evaluation.second_attempts is not None:
+            attempts = ExperienceLibrary(plan.evaluation.second_attempts)
+            self._pairs = pair_second_attempts(attempts.columns())
+        self._fitted: dict[str, Selector] = {}
+
+    def selector(self, method: str, environment: int, goal: int) -> Selector:
+        """Returns a strategy for a trial."""
         first, later = split_method(method)
         if later is not None:
             return FallbackSelector(
-                first=self._selector(first, environment, goal),
-                later=self._selector(later, environment, goal),
+                first=self.selector(first, environment, goal),
+                later=self.selector(later, environment, goal),
                 method=method,
             )
         if method == "rnd":
             # Draws of its own for every trial: independent of how many others there are.
-            rng = make_generator(self._evaluation.stream, "rnd", environment, goal)
+            rng = make_generator(self._plan.evaluation.stream, "rnd", environment, goal)
             return RandomSelector(rng=rng)
-        if method not in self._selectors:
-            self._selectors[method] = make_selector(
+        if method not in self._fitted:
+            self._fitted[method] = make_selector(
                 method,
-                self.scenario.arm(),
+                self._plan.scenario.arm(),
                 self._columns if needs_library(method) else None,
-                category=self.scenario.category,
+                category=self._plan.scenario.category,
                 pairs=self._pairs,
-                added=self._added,
             )
-        return self._selectors[method]
-
-    def _reach(self, request: ReachRequest) -> ReachRecord:
-        if request.key not in self._known:
-            self._known[request.key] = run_reach(request)
-            self.new.append(self._known[request.key])
-        return self._known[request.key]
+        return self._fitted[method]
 
 
-_worker: _Worker | LicError | None = None
+_strategies = lru_cache(maxsize=1)(_Strategies)
+"""A worker keeps the strategies of its evaluation from one environment to the next."""
 
 
-def _begin_worker(evaluation: Evaluation) -> None:
-    global _worker
-    prepare_worker()
-    try:
-        _worker = _Worker(evaluation)
-    except LicError as error:  # An executor would only say that its worker broke.
-        _worker = error
+def _try_environment(
+    plan: _Plan, environment: int, known: list[ReachRecord]
+) -> tuple[list[TrialRow], list[ReachRecord]]:
+    """Runs in a worker: all trials in an environment, and those of its reaches that are new."""
+    records = {record.key: record for record in known}
+    new: list[ReachRecord] = []
 
+    def reach(request: ReachRequest) -> ReachRecord:
+        if request.key not in records:
+            records[request.key] = run_reach(request)
+            new.append(records[request.key])
+        return records[request.key]
 
-def _run_block(environments: range) -> tuple[list[TrialRow], list[ReachRecord]]:
-    if not isinstance(_worker, _Worker):
-        raise _worker or LicError("the worker was not prepared")
-    _worker.new = []
     rows = [
         TrialRow(
-            variant=_worker._evaluation.variant,
+            variant=plan.evaluation.variant,
             method=method,
             environment=environment,
             goal=goal,
@@ -317,7 +304,57 @@ def _run_block(environments: range) -> tuple[list[TrialRow], list[ReachRecord]]:
             else attempt.selection.probability,
             seconds=attempt.selection.seconds,
         )
-        for method, environment, goal, attempts, won in _worker.run(environments)
+        for method, goal, attempts, won in _trials(plan, environment, reach)
         for number, attempt in enumerate(attempts, start=1)
     ]
-    return rows, _worker.new
+    return rows, new
+
+
+def _trials(
+    plan: _Plan, environment: int, reach: Callable[[ReachRequest], ReachRecord]
+) -> Iterator[tuple[str, int, list[Attempt], bool]]:
+    """Yields method, goal, attempts and success of each trial in an environment."""
+    evaluation, strategies = plan.evaluation, _strategies(plan)
+    for goal in range(evaluation.goals):
+        at = evaluation.first_environment if evaluation.common_goals else environment
+        p_WG = plan.scenario.sample_goal(evaluation.stream, at, goal)
+        observer = _observer(plan, environment, p_WG)
+        for method in evaluation.methods:
+            attempts = run_trial(
+                plan.scenario,
+                strategies.selector(method, environment, goal),
+                evaluation.stream,
+                environment,
+                p_WG,
+                evaluation.attempts,
+                fresh=evaluation.fresh,
+                moves=evaluation.moves,
+                reach=reach,
+                look=observer,
+            )
+            last = attempts[-1].record
+            yield (
+                method,
+                goal,
+                attempts,
+                last.success if observer is None else observer.touches_ball(last),
+            )
+        if observer is not None:
+            # A renderer takes 150 MB, and its diagram is a reference cycle: only the collector
+            # frees it.
+            del observer
+            gc.collect()
+
+
+def _observer(plan: _Plan, environment: int, p_WG: Vector) -> Observer | None:
+    """Returns the observer of an environment; all strategies see the same images."""
+    if plan.cameras is None:
+        return None
+    return Observer(
+        scenario=plan.scenario,
+        stream=plan.evaluation.stream,
+        environment=environment,
+        p_WG=p_WG,
+        cameras=plan.cameras,
+        moves=plan.evaluation.moves,
+    )

@@ -11,7 +11,7 @@ from statistics import median
 from typing import Any
 
 import lic_drake
-from lic_drake.evaluate.batch import random_requests
+from lic_drake.evaluate.trial import random_requests
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario
 

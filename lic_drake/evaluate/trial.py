@@ -9,6 +9,7 @@ from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.starts import Starts, make_starts
+from lic_drake.seeds import make_generator
 from lic_drake.select.registry import Selector
 from lic_drake.select.situation import FailedReach, Selection, Situation
 from lic_drake.types import Vector
@@ -73,3 +74,26 @@ def run_trial(
 
 def _knowing(p_WG: Vector, starts: Starts) -> Callable[[int], tuple[Vector, Starts]]:
     return lambda _: (p_WG, starts)
+
+
+def random_requests(
+    scenario: Scenario, stream: str, environments: int, goals: int
+) -> list[ReachRequest]:
+    """Returns reaches from random starts of the grid to random goals: RND's first attempts.
+
+    Args:
+        scenario: What to simulate.
+        stream: Seed stream of environments, goals and starts.
+        environments: Number of environments, from index 0.
+        goals: Number of goals in each; of starts to its goal where an environment offers one.
+    """
+    requests = []
+    for environment in range(environments):
+        starts = make_starts(scenario, scenario.sample_instance(stream, environment)).grid
+        for goal in range(goals):
+            index = 0 if scenario.task.goal_area is None else goal
+            p_WG = scenario.sample_goal(stream, environment, index)
+            rng = make_generator(stream, "rnd", environment, goal)
+            start = starts[int(rng.integers(len(starts)))]
+            requests.append(ReachRequest(scenario, stream, environment, p_WG, start))
+    return requests

@@ -1,14 +1,22 @@
-"""Checks a library: what is there, what its request still lacks, and what is damaged."""
+"""Checks of a library: what it lacks, what is damaged, and whether its rows come out again."""
 
+import math
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+
+import numpy as np
 
 from lic_drake.errors import LibraryError
-from lic_drake.experience.added import FOLDER, addition_paths, read_addition
-from lic_drake.experience.grid import CollectionRequest
-from lic_drake.experience.journal import journal_paths, read_journal
+from lic_drake.experience.collect import CollectionRequest
+from lic_drake.experience.runner import ReachFunction
 from lic_drake.experience.schema import read_header, read_table
 from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.reach.request import SIMULATION, ReachRecord, ReachRequest
+from lic_drake.reach.rollout import run_reach
+
+NOT_COMPARED = ("wall_time_s", "lic_drake_version", "drake_version", "weight")
+"""What a repetition may change without being another reach."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,10 +39,7 @@ class LibraryReport:
     Attributes:
         shards: Number of Parquet files.
         reaches: Number of rows in the readable ones.
-        journalled: Number of finished reaches of interrupted tasks, not yet in a shard.
-        added: Number of readable records that were added from elsewhere.
-        damaged: Parquet files that cannot be read, those of added records included.
-        lost_lines: Number of damaged lines in journals; their reaches will be simulated again.
+        damaged: Parquet files that cannot be read.
         scenarios: Digests of the scenarios in the library; more than one is an error.
         duplicates: Keys of reaches that the library holds more than once, sorted.
         requested: Number of reaches of the request; None without a request.
@@ -44,10 +49,7 @@ class LibraryReport:
 
     shards: int
     reaches: int
-    journalled: int
-    added: int
     damaged: tuple[DamagedFile, ...]
-    lost_lines: int
     scenarios: tuple[str, ...]
     duplicates: tuple[str, ...]
     requested: int | None
@@ -75,7 +77,7 @@ def check_library(
         request: What it should hold; None leaves completeness open.
 
     Raises:
-        LibraryError: There is no library, or a journal may not be read.
+        LibraryError: There is no library.
     """
     paths = library.shard_paths()
     damaged: list[DamagedFile] = []
@@ -87,14 +89,6 @@ def check_library(
             scenarios.add(read_header(path).scenario_digest)
         except LibraryError as error:
             damaged.append(DamagedFile(name=path.name, reason=str(error)))
-    added = 0
-    for path in addition_paths(library):
-        try:
-            added += read_addition(path).records
-        except LibraryError as error:
-            damaged.append(DamagedFile(name=f"{FOLDER}/{path.name}", reason=str(error)))
-    journals = [read_journal(path) for path in journal_paths(library.path)]
-    journalled = {record.key for records, _ in journals for record in records} - keys.keys()
     lacking: dict[int, int] = {}
     requested = 0
     if request is not None:
@@ -106,13 +100,83 @@ def check_library(
     return LibraryReport(
         shards=len(paths),
         reaches=keys.total(),
-        journalled=len(journalled),
-        added=added,
         damaged=tuple(damaged),
-        lost_lines=sum(count for _, count in journals),
         scenarios=tuple(sorted(scenarios)),
         duplicates=tuple(sorted(key for key, count in keys.items() if count > 1)),
         requested=None if request is None else requested,
         missing=None if request is None else sum(lacking.values()),
         incomplete=tuple(lacking),
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Difference:
+    """A row that came out otherwise.
+
+    Attributes:
+        key: Its key.
+        fields: Names of the fields that differ in any bit.
+        outcomes: Outcome in the library, and of the repetition.
+    """
+
+    key: str
+    fields: tuple[str, ...]
+    outcomes: tuple[str, str]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recomputation:
+    """What `recompute` found.
+
+    Attributes:
+        rows: Number of rows that were simulated again.
+        differing: Those that came out otherwise, environment by environment.
+    """
+
+    rows: int
+    differing: tuple[Difference, ...]
+
+
+def recompute(
+    library: ExperienceLibrary,
+    count: int,
+    rng: np.random.Generator,
+    *,
+    reach: ReachFunction = run_reach,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Recomputation:
+    """Simulates random simulated rows of a library again: a record is a function of its request.
+
+    Equality to the last bit may be asked for on the machine that collected the library: other
+    processors round otherwise, and contact makes much of little.
+
+    Args:
+        library: The library.
+        count: Number of rows to draw without replacement; all of them if there are fewer.
+        rng: Draws them.
+        reach: Simulates a request.
+        progress: Is called after each row with the number of rows done and in all.
+
+    Raises:
+        LibraryError: The library is empty, or cannot be read.
+    """
+    scenario = library.scenario()
+    rows = [row for row in library.records() if row.source == SIMULATION]
+    drawn = [rows[i] for i in rng.choice(len(rows), min(count, len(rows)), replace=False)]
+    # An environment's diagrams are built once.
+    drawn.sort(key=lambda row: (row.stream, row.environment))
+    differing: list[Difference] = []
+    for done, row in enumerate(drawn, start=1):
+        again = reach(ReachRequest.from_record(row, scenario))
+        names = [f.name for f in fields(ReachRecord) if f.name not in NOT_COMPARED]
+        if others := tuple(n for n in names if not _is_same(getattr(row, n), getattr(again, n))):
+            outcomes = (row.outcome, again.outcome)
+            differing.append(Difference(key=row.key, fields=others, outcomes=outcomes))
+        progress(done, len(drawn))
+    return Recomputation(rows=len(drawn), differing=tuple(differing))
+
+
+def _is_same(a: object, b: object) -> bool:
+    """Returns whether two values are equal; NaN equals itself."""
+    both_nan = isinstance(a, float) and isinstance(b, float) and math.isnan(a) and math.isnan(b)
+    return both_nan or a == b

@@ -1,222 +1,174 @@
-"""`collect`: fills a library with the reaches that it still lacks.
+"""`collect`: fills a library with every goal times every start, in some environments (paper IV-A).
 
-An environment is a task, and a task makes one shard.
+What a library is to hold, a `CollectionRequest`, is kept beside its shards as a small YAML file,
+so that a collection can go on, and grow, without being told again.
 """
 
-import time
-from collections import defaultdict, deque
-from collections.abc import Callable
-from concurrent.futures import BrokenExecutor, Executor
-from contextlib import ExitStack, suppress
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
 from pathlib import Path
-from queue import Empty, SimpleQueue
+from typing import Any
 
-from lic_drake.errors import ClusterError, LibraryError
-from lic_drake.experience.grid import (
-    REQUEST_FILE,
-    CollectionRequest,
-    read_request,
-    write_request,
-)
-from lic_drake.experience.journal import journal_path
-from lic_drake.experience.lock import CollectionLock, starting
-from lic_drake.experience.progress import Progress, ProgressFunction, Reporter
-from lic_drake.experience.schema import read_table
-from lic_drake.experience.shard import WHOLE, Shard
-from lic_drake.experience.slots import MAX_BREAKS, Slot, TaskState
-from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.experience.task import ReachFunction, Task, simulate
-from lic_drake.experience.workers import make_process_pool
+import numpy as np
+import yaml
+from filelock import FileLock
+from numpy.typing import NDArray
 
-POLL_S = 0.5
-"""Wall time between two looks at what is going on, seconds."""
+from lic_drake.config import read_mapping
+from lic_drake.errors import LibraryError, RequestError, ScenarioError
+from lic_drake.experience.files import readable_errors, write_atomically
+from lic_drake.experience.runner import ProgressFunction, ReachFunction, Report, simulate
+from lic_drake.experience.schema import scenario_text
+from lic_drake.experience.store import WHOLE, ExperienceLibrary, Share
+from lic_drake.experience.workers import Workers
+from lic_drake.reach.request import ReachRequest
+from lic_drake.reach.rollout import run_reach
+from lic_drake.reach.scenario import Scenario, parse_scenario
+from lic_drake.reach.start import Starts
+from lic_drake.reach.starts import training_starts
+from lic_drake.seeds import STREAMS
+from lic_drake.types import Vector
 
+REQUEST_FILE = "_collection.yaml"
+"""Name of the request's file in a library; the underscore hides it from Parquet readers."""
 
-@dataclass(frozen=True, kw_only=True)
-class FailedTask:
-    """An environment that could not be finished.
-
-    Attributes:
-        environment: Its index.
-        reason: One line.
-    """
-
-    environment: int
-    reason: str
+MAX_ENVIRONMENTS = 1_000_000
+"""More environments than this in one library are refused as a slip of the keyboard."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class CollectionReport:
-    """What a collection did.
+class CollectionRequest:
+    """All goals times all starts of a scenario's task, in some environments of a seed stream.
 
     Attributes:
-        progress: The state at its end.
-        failed: Environments that were left out; the library lacks some of their reaches.
+        scenario: The scenario; its task gives the grids of goals and starts.
+        stream: Seed stream of the environments.
+        first_environment: Index of the first environment in its stream.
+        environments: Number of environments.
+        max_goals: Use at most this many goals of the grid, evenly thinned; None: all.
+        max_starts: Use at most this many starts of the grid, evenly thinned; None: all.
+
+    Raises:
+        RequestError: A value is out of its range.
     """
 
-    progress: Progress
-    failed: tuple[FailedTask, ...]
+    scenario: Scenario
+    stream: str = "training"
+    first_environment: int = 0
+    environments: int = 20
+    max_goals: int | None = None
+    max_starts: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.stream not in STREAMS:
+            raise RequestError(f"unknown stream {self.stream!r}; choose one of {list(STREAMS)}")
+        if not 0 <= self.first_environment < 2**31:
+            raise RequestError(
+                f"the first environment must be from 0 to 2^31 - 1, got {self.first_environment}"
+            )
+        if not 1 <= self.environments <= MAX_ENVIRONMENTS:
+            raise RequestError(
+                f"environments must be from 1 to {MAX_ENVIRONMENTS}, got {self.environments}"
+            )
+        for name in ("max_goals", "max_starts"):
+            value = getattr(self, name)
+            if value is not None and value < 1:
+                raise RequestError(f"{name} must be 1 or more, got {value}")
+
+    @property
+    def environment_indices(self) -> range:
+        """Indices of the environments in their stream."""
+        return range(self.first_environment, self.first_environment + self.environments)
+
+    def goals(self, environment: int | None = None) -> Vector:
+        """Returns the goals p_WG in an environment, shape (n, 3), metres; n is the same in all.
+
+        Args:
+            environment: Its index in the stream; the first one by default.
+        """
+        index = self.first_environment if environment is None else environment
+        return _thin(self.scenario.goals(self.stream, index), self.max_goals)
+
+    def starts(self, environment: int | None = None) -> Starts:
+        """Returns the m initial conditions in an environment.
+
+        m is the same in all but where base and torso of a robot are not.
+
+        Args:
+            environment: Its index in the stream; the first one by default.
+
+        Raises:
+            RequestError: The arm can take no start pose.
+        """
+        index = self.first_environment if environment is None else environment
+        starts = training_starts(self.scenario, self.stream, index)
+        if len(starts) == 0:
+            raise RequestError(
+                f"{self.scenario.robot} can take no pose of the start line's grid;"
+                " change task.start_line in the scenario"
+            )
+        return starts.take(_thin(np.arange(len(starts)), self.max_starts))
+
+    def reaches(self, environment: int) -> list[ReachRequest]:
+        """Returns the reaches into one environment; the starts vary fastest."""
+        starts = self.starts(environment)
+        return [
+            ReachRequest(self.scenario, self.stream, environment, p_WG, start)
+            for p_WG in self.goals(environment)
+            for start in starts
+        ]
+
+    def all_reaches(self, share: Share = WHOLE) -> Iterator[ReachRequest]:
+        """Yields the reaches of a share, environment by environment."""
+        for environment in share.of(self.environment_indices):
+            yield from self.reaches(environment)
+
+    def num_reaches(self, share: Share = WHOLE) -> int:
+        """Returns the number of reaches of a share."""
+        environments = share.of(self.environment_indices)
+        if self.scenario.task.stand is None:
+            return len(self.goals()) * len(self.starts()) * len(environments)
+        return sum(len(self.goals(i)) * len(self.starts(i)) for i in environments)
 
 
 def collect(
     library: ExperienceLibrary,
     request: CollectionRequest,
+    workers: Workers | None = None,
     *,
-    shard: Shard = WHOLE,
-    workers: int | Callable[[], int] = 1,
-    make_executor: Callable[[], Executor] = make_process_pool,
-    reach: ReachFunction = simulate,
+    share: Share = WHOLE,
+    reach: ReachFunction = run_reach,
     progress: ProgressFunction | None = None,
-) -> CollectionReport:
-    """Simulates the reaches of a request that are not yet in a library.
-
-    A finished reach is never lost: not by a killed worker, a full disk, Ctrl-C or the end of this
-    process. The library does not depend on the number of workers (but for wall times). A script
-    that calls this needs the usual `if __name__ == "__main__":`.
+) -> Report:
+    """Simulates the reaches of a request that are not yet in a library; see `simulate`.
 
     Args:
         library: A folder; made if absent.
-        request: What the library is to hold. A library that was begun before only takes the same
+        request: What the library is to hold. A library that was begun before takes only the same
             request, or one with more environments.
-        shard: The share of the environments to simulate; collections of other shares of the same
-            division may be at work on the same library.
-        workers: Number of tasks at work at a time; a function where that changes, as in
-            `Cluster.num_workers`.
-        make_executor: Makes an executor for one task at a time, for instance
-            `Cluster.make_executor`. Its workers must see the library's folder.
-        reach: Simulates a request; a top-level function.
-        progress: Is called about twice a second.
+        workers: Where to simulate; by default in this process.
+        share: The share of the environments to simulate.
+        reach: Simulates a request.
+        progress: Shows how far the collection is.
 
     Raises:
-        LibraryError: The library belongs to another request, holds a damaged file, or cannot be
-            written. Workers have stopped, finished reaches are kept.
-        ClusterError: The cluster cannot be used; as above.
-        KeyboardInterrupt: As on Ctrl-C; workers have stopped, finished reaches are kept.
+        LibraryError: The library belongs to another request, or as in `simulate`.
+        ClusterError: As in `simulate`.
+        KeyboardInterrupt: As in `simulate`.
     """
     library.create()
-    slots: list[Slot] = []
-    idle: list[Slot] = []
-    ended: SimpleQueue[Slot] = SimpleQueue()
-    with ExitStack() as stack:
-        with starting(library.path):
-            lock = stack.enter_context(CollectionLock(library.path, shard))
-            _record_request(library, request)
-        collection = _Collection(library, request, shard, lock.path, reach)
-
-        def look() -> Progress:
-            for slot in slots:
-                slot.poll()
-            return collection.progress(at_work=len(slots) - len(idle))
-
-        reporter = Reporter(progress, look, POLL_S)
-        try:
-            while collection.waiting or len(idle) < len(slots):
-                allowed = workers() if callable(workers) else workers
-                while collection.waiting and len(slots) - len(idle) < allowed:
-                    if not idle:
-                        slots.append(Slot(make_executor, ended))
-                        idle.append(slots[-1])
-                    idle[-1].start(collection.waiting.popleft())
-                    idle.pop()
-                with suppress(Empty):
-                    slot = ended.get(timeout=POLL_S)
-                    idle.append(slot)
-                    collection.conclude(*slot.take())
-                reporter.report()
-        except (LibraryError, ClusterError) as error:
-            raise type(error)(
-                f"{error}; finished reaches are kept, run the same command to go on"
-            ) from error
-        finally:
-            lock.stop_workers()
-            for slot in slots:
-                slot.close()
-            idle[:] = slots
-            final = reporter.finish()
-    return CollectionReport(progress=final, failed=tuple(collection.failed))
-
-
-class _Collection:
-    """The tasks of a collection and what became of them.
-
-    Attributes:
-        waiting: Tasks that no slot has begun.
-        failed: Tasks that were given up.
-    """
-
-    def __init__(
-        self,
-        library: ExperienceLibrary,
-        request: CollectionRequest,
-        shard: Shard,
-        lock: Path,
-        reach: ReachFunction,
-    ) -> None:
-        self._began = time.monotonic()
-        held = _held(library, request.stream)
-        digest = request.scenario.digest
-        environments = shard.share(request.environment_indices)
-        self._total = request.num_reaches(environments)
-        self._stored = self._stored_successes = 0
-        self._states: list[TaskState] = []
-        for environment in environments:
-            missing = None
-            if environment in held:
-                successes = held[environment]
-                keys = {item.key for item in request.reaches(environment)}
-                missing = frozenset(keys - successes.keys())
-                self._stored += len(keys) - len(missing)
-                self._stored_successes += sum(successes[key] for key in keys - missing)
-            task = Task(
-                library=library.path.absolute(),
-                lock=lock.absolute(),
-                request=request,
-                scenario_digest=digest,
-                environment=environment,
-                missing=missing,
-                reach=reach,
-            )
-            if missing is None or missing:
-                self._states.append(TaskState(task))
-            else:  # A kill between writing the shard and deleting the journal leaves both.
-                journal_path(task.shard).unlink(missing_ok=True)
-        self._present = self._stored + sum(state.finished for state in self._states)
-        self.waiting = deque(self._states)
-        self.failed: list[FailedTask] = []
-
-    def conclude(self, state: TaskState, error: Exception | None) -> None:
-        """Decides what becomes of a task that ended, perhaps with an error.
-
-        Raises:
-            LibraryError: The task could not write; the others could not either.
-            ClusterError: The task has no cluster any more; the others have none either.
-        """
-        if error is None:
-            return
-        if isinstance(error, LibraryError | ClusterError):
-            raise error
-        if isinstance(error, BrokenExecutor):
-            if not state.is_deadly():
-                self.waiting.append(state)
-                return
-            reason = f"its worker process died {MAX_BREAKS} times at the same reach"
-            if deadly := state.next_reach():
-                reason += f", from start {deadly.start} to goal {deadly.goal}"
-        else:
-            reason = " ".join(f"{type(error).__name__}: {error}".split())
-        self.failed.append(FailedTask(environment=state.task.environment, reason=reason))
-
-    def progress(self, at_work: int) -> Progress:
-        """Returns the present state, as far as the journals were looked at."""
-        return Progress(
-            at_work=at_work,
-            total=self._total,
-            present=self._present,
-            done=self._stored + sum(state.finished for state in self._states),
-            successes=self._stored_successes + sum(state.successes for state in self._states),
-            elapsed_s=time.monotonic() - self._began,
-        )
+    # Shares of one collection begin at the same time.
+    with library.locked(share), FileLock(library.path / "_collection.lock"):
+        _record_request(library, request)
+    return simulate(
+        request.all_reaches(share),
+        library,
+        workers,
+        total=request.num_reaches(share),
+        share=share,
+        reach=reach,
+        progress=progress,
+    )
 
 
 def _record_request(library: ExperienceLibrary, request: CollectionRequest) -> None:
@@ -224,7 +176,7 @@ def _record_request(library: ExperienceLibrary, request: CollectionRequest) -> N
     path = library.path / REQUEST_FILE
     if path.exists():
         stored = read_request(path)
-        request.refuse_unless_continuing(stored, library.path)
+        _refuse_unless_continuing(request, stored, library.path)
         if stored.environments == request.environments:
             return
     if library.shard_paths() and library.header().scenario_digest != request.scenario.digest:
@@ -235,12 +187,96 @@ def _record_request(library: ExperienceLibrary, request: CollectionRequest) -> N
     write_request(request, path)
 
 
-def _held(library: ExperienceLibrary, stream: str) -> dict[int, dict[str, bool]]:
-    """Returns environment -> key -> success of all reaches of a stream in a library."""
-    held: defaultdict[int, dict[str, bool]] = defaultdict(dict)
-    for path in library.shard_paths():
-        table = read_table(path, ["stream", "environment", "key", "success"])
-        for row in zip(*(column.to_pylist() for column in table.columns), strict=True):
-            if row[0] == stream:
-                held[row[1]][row[2]] = row[3]
-    return held
+def _refuse_unless_continuing(
+    request: CollectionRequest, stored: CollectionRequest, path: Path
+) -> None:
+    """Refuses a request that differs from a library's own in more than more environments."""
+    ours, theirs = _values(request), _values(stored)
+    differences = [
+        f"{name} {theirs[name]} instead of {ours[name]}"
+        for name in ours
+        if name != "environments" and theirs[name] != ours[name]
+    ]
+    if request.environments < stored.environments:
+        differences.append(f"{stored.environments} environments, not {request.environments}")
+    if differences:
+        raise LibraryError(
+            f"{path} was begun with {', '.join(differences)}; give the same options (or none) to"
+            " go on, or another folder"
+        )
+
+
+def write_request(request: CollectionRequest, path: Path) -> None:
+    """Writes a request as YAML, with every value of its scenario.
+
+    Raises:
+        LibraryError: The file cannot be written.
+    """
+    data = {**_values(request), "scenario": yaml.safe_load(scenario_text(request.scenario))}
+    content = "# What `lic collect` puts into this folder; seeds and values are complete.\n"
+    content += yaml.safe_dump(data, sort_keys=False)
+    write_atomically(path, lambda temporary: _write_text(temporary, content))
+
+
+def read_request(path: Path) -> CollectionRequest:
+    """Reads a request from YAML.
+
+    Raises:
+        LibraryError: The file cannot be read or is not a request.
+        RequestError: A value is out of its range.
+        ScenarioError: Its scenario is not one that this lic_drake knows.
+    """
+    with readable_errors(path, "read"):
+        content = path.read_bytes()
+    try:
+        data = read_mapping(content, str(path))
+    except ScenarioError:
+        data = {}
+    if not _is_request(data):
+        raise LibraryError(
+            f"{path} is not a collection request; restore it, or delete it and run lic collect"
+            " with the library's options"
+        )
+    digest = data.pop("scenario_digest")
+    scenario = parse_scenario(yaml.safe_dump(data.pop("scenario")), source=str(path))
+    if scenario.digest != digest:
+        raise LibraryError(
+            f"{path}: its scenario has digest {scenario.digest}, the library was begun with"
+            f" {digest}: the file was edited or another lic_drake wrote it; use another folder"
+        )
+    return CollectionRequest(scenario=scenario, **data)
+
+
+def _values(request: CollectionRequest) -> dict[str, Any]:
+    """Returns a request as plain values, its scenario as digest."""
+    names = [item.name for item in fields(request) if item.name != "scenario"]
+    return {
+        "scenario_digest": request.scenario.digest,
+        **{name: getattr(request, name) for name in names},
+    }
+
+
+def _is_request(data: dict[Any, Any]) -> bool:
+    """Returns whether parsed YAML has exactly the keys of a request with values of their types."""
+    types: dict[str, tuple[type, ...]] = {
+        "scenario_digest": (str,),
+        "stream": (str,),
+        "first_environment": (int,),
+        "environments": (int,),
+        "max_goals": (int, type(None)),
+        "max_starts": (int, type(None)),
+        "scenario": (dict,),
+    }
+    return set(data) == set(types) and all(type(data[key]) in types[key] for key in types)
+
+
+def _write_text(path: Path, content: str) -> None:
+    path.write_text(content, encoding="utf-8")
+
+
+def _thin[T: np.generic](grid: NDArray[T], count: int | None) -> NDArray[T]:
+    """Returns `count` rows from the middles of equal parts of a grid, or all of it."""
+    if count is None or count >= len(grid):
+        return grid
+    middles = ((np.arange(count) + 0.5) * len(grid) / count).astype(int)
+    return np.take(grid, middles, axis=0)

@@ -1,11 +1,9 @@
 """Files that are either whole or absent, and system errors as one clear line."""
 
-import fcntl
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
 
 from lic_drake.errors import LibraryError
 
@@ -61,34 +59,6 @@ def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
             temporary.unlink(missing_ok=True)
             raise
         _sync(path.parent)
-
-
-def open_locked(path: Path, *, wait: bool) -> BinaryIO:
-    """Opens a file for reading and writing, made if absent, that nobody else has locked.
-
-    The lock is given back when the file is closed or the process ends, however it ends.
-
-    Args:
-        path: The file; its folder must exist.
-        wait: Wait until the file is free.
-
-    Raises:
-        BlockingIOError: The file is locked and `wait` is false.
-        OSError: The file cannot be opened.
-    """
-    flags = fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB
-    while True:
-        # Unbuffered: what the disk refused once must not be written again on close.
-        file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b", buffering=0)
-        try:
-            fcntl.flock(file, flags)
-            # The last holder may have deleted the file between our opening and our locking.
-            if path.exists() and os.path.samestat(os.fstat(file.fileno()), path.stat()):
-                return file
-        except BaseException:
-            file.close()
-            raise
-        file.close()
 
 
 def _sync(path: Path) -> None:

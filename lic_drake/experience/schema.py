@@ -1,13 +1,13 @@
 """The columns of an experience library, and rows to and from tables.
 
-The schema follows the fields of `ReachRecord`; units and descriptions stand in the metadata of
-each column. The table's metadata tells the schema's version and carries the whole scenario, so
-that a shard explains itself. Nothing that is read from a file is executed or unpickled.
+The columns are the fields of `ReachRecord`, with their units and descriptions as metadata. The
+table's metadata holds the schema's version and the whole scenario, so that a shard explains
+itself. Nothing that is read from a file is executed or unpickled.
 """
 
 import dataclasses
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +20,8 @@ from lic_drake.errors import LibraryError, quoted
 from lic_drake.reach.request import ReachRecord
 from lic_drake.reach.scenario import Scenario, to_dict
 
-SCHEMA_VERSION = 3
-"""Grows with every change of the columns or the metadata. Columns that came later than version 1
-say so (`since`) and have the default that older tables are read with."""
+SCHEMA_VERSION = 4
+"""Grows with every change of the columns or the metadata."""
 
 _TYPES = {
     str: pa.string(),
@@ -38,27 +37,18 @@ FIELDS: dict[str, Any] = {item.name: item.type for item in dataclasses.fields(Re
 TUPLES = [name for name, kind in FIELDS.items() if kind == tuple[float, ...]]
 """Names of the list columns."""
 
-_SINCE = {item.name: item.metadata.get("since", 1) for item in dataclasses.fields(ReachRecord)}
-
-
-def schema_of(version: int) -> pa.Schema:
-    """Returns the columns of a schema version, without the metadata that differs by table."""
-    return pa.schema(
-        [
-            pa.field(
-                item.name,
-                _TYPES[FIELDS[item.name]],
-                nullable=False,
-                metadata={key: str(value) for key, value in item.metadata.items()},
-            )
-            for item in dataclasses.fields(ReachRecord)
-            if _SINCE[item.name] <= version
-        ]
-    )
-
-
-SCHEMA = schema_of(SCHEMA_VERSION)
-"""The columns that this version writes."""
+SCHEMA = pa.schema(
+    [
+        pa.field(
+            item.name,
+            _TYPES[FIELDS[item.name]],
+            nullable=False,
+            metadata={key: str(value) for key, value in item.metadata.items()},
+        )
+        for item in dataclasses.fields(ReachRecord)
+    ]
+)
+"""The columns, without the metadata that differs by table."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -149,15 +139,13 @@ def _read(path: Path, columns: list[str] | None) -> tuple[TableHeader, pa.Table]
     try:
         with pq.ParquetFile(path, page_checksum_verification=True) as file:
             header = _check_schema(path, file.schema_arrow)
-            wanted = FIELDS if columns is None else columns
-            later = {name for name in wanted if _SINCE[name] > header.schema_version}
-            table = file.read(columns=[name for name in wanted if name not in later])
+            table = file.read(columns=list(FIELDS) if columns is None else columns)
             # Checksums are of pages only: a damaged footer can hide rows.
             groups = [file.metadata.row_group(i) for i in range(file.num_row_groups)]
             rows = {file.metadata.num_rows, sum(group.num_rows for group in groups)}
             if rows != {table.num_rows}:
                 raise pa.ArrowInvalid(f"rows of the parts and of the whole differ: {rows}")
-            return header, _with_defaults(table, wanted, later)
+            return header, table.select(list(FIELDS) if columns is None else columns)
     except (OSError, UnicodeDecodeError, pa.ArrowException) as error:
         # Damage makes pyarrow raise OSErrors, too, but without an error number.
         number = getattr(error, "errno", None)
@@ -167,16 +155,6 @@ def _read(path: Path, columns: list[str] | None) -> tuple[TableHeader, pa.Table]
             f"{path} is damaged or not a Parquet file; if it belongs to a library, delete it and"
             " collect its reaches again"
         ) from error
-
-
-def _with_defaults(table: pa.Table, wanted: Iterable[str], later: set[str]) -> pa.Table:
-    """Adds the columns that came later than an older table, with their defaults."""
-    defaults = {item.name: item.default for item in dataclasses.fields(ReachRecord)}
-    for name in wanted:
-        if name in later:
-            column = pa.array([defaults[name]] * table.num_rows, SCHEMA.field(name).type)
-            table = table.append_column(SCHEMA.field(name), column)
-    return table.select(list(wanted))
 
 
 def _check_schema(path: Path, schema: pa.Schema) -> TableHeader:
@@ -194,16 +172,15 @@ def _check_schema(path: Path, schema: pa.Schema) -> TableHeader:
             f"{path} is not part of an experience library (no lic_drake metadata);"
             " move it out of the library's folder"
         ) from None
-    if not 1 <= header.schema_version <= SCHEMA_VERSION:
+    if header.schema_version != SCHEMA_VERSION:
         raise LibraryError(
             f"{path} has schema version {quoted(header.schema_version)}, written by lic_drake"
             f" {quoted(header.lic_drake_version)}; this lic_drake {lic_drake.__version__} reads"
-            f" versions up to {SCHEMA_VERSION}: use that lic_drake, or collect the library again"
+            f" version {SCHEMA_VERSION}: use that lic_drake, or collect the library again"
         )
-    expected = schema_of(header.schema_version)
-    if not schema.equals(expected, check_metadata=False):
-        odd = sorted(set(expected.names) ^ set(schema.names)) or [
-            mine.name for mine, theirs in zip(expected, schema, strict=False) if mine != theirs
+    if not schema.equals(SCHEMA, check_metadata=False):
+        odd = sorted(set(SCHEMA.names) ^ set(schema.names)) or [
+            mine.name for mine, theirs in zip(SCHEMA, schema, strict=False) if mine != theirs
         ]
         names = ", ".join(map(quoted, odd[:5])) or "some twice"
         raise LibraryError(

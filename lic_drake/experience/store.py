@@ -1,14 +1,19 @@
 """`ExperienceLibrary`: the library D of the paper (III-A) as a folder of Parquet shards."""
 
+import dataclasses
+import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import pyarrow as pa
+from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
-from lic_drake.errors import LibraryError, quoted
+from lic_drake.errors import LibraryError, RequestError, quoted
 from lic_drake.experience.files import readable_errors, write_atomically
 from lic_drake.experience.schema import (
     TableHeader,
@@ -27,6 +32,56 @@ SUFFIX = ".parquet"
 
 COMPACTED = "reaches"
 """Name of the shard that holds all rows after `ExperienceLibrary.compact`."""
+
+PATIENCE_S = 1.0
+"""A lock that is only looked at by others is free within this time, seconds."""
+
+
+@dataclass(frozen=True)
+class Share:
+    """Every `count`-th environment of a collection, from the `index`-th on: a job of a job array.
+
+    Attributes:
+        index: Which share, 1 to `count`.
+        count: Number of shares.
+
+    Raises:
+        RequestError: The index is out of range.
+    """
+
+    index: int = 1
+    count: int = 1
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.index <= self.count:
+            raise RequestError(
+                f"a share is k/n with k from 1 to n, got {self}; start the job array at 1"
+            )
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """Reads "k/n".
+
+        Raises:
+            RequestError: The text is something else.
+        """
+        index, _, count = text.partition("/")
+        if not (index.isdecimal() and count.isdecimal()):
+            raise RequestError(
+                f"a share is k/n with k from 1 to n, for instance 3/20, got {quoted(text)}"
+            )
+        return cls(int(index), int(count))
+
+    def __str__(self) -> str:
+        return f"{self.index}/{self.count}"
+
+    def of(self, environments: range) -> range:
+        """Returns this share of the environments of a collection."""
+        return environments[self.index - 1 :: self.count]
+
+
+WHOLE = Share()
+"""The whole collection as one share."""
 
 
 class ExperienceLibrary:
@@ -66,13 +121,18 @@ class ExperienceLibrary:
         """Number of rows, read from the shards' footers."""
         return sum(len(read_table(path, [])) for path in self.shard_paths())
 
-    def keys(self) -> set[str]:
-        """Returns the request keys of all reaches in the library."""
-        return {
-            key
-            for path in self.shard_paths()
-            for key in read_table(path, ["key"]).column("key").to_pylist()
-        }
+    def successes(self) -> dict[str, bool]:
+        """Returns the key of every reach in the library, and whether it reached its goal.
+
+        Raises:
+            LibraryError: A file is damaged.
+        """
+        found: dict[str, bool] = {}
+        for path in self.shard_paths():
+            table = read_table(path, ["key", "success"])
+            keys, successes = (column.to_pylist() for column in table.columns)
+            found.update(zip(keys, successes, strict=True))
+        return found
 
     def header(self) -> TableHeader:
         """Returns the metadata of the shards, which must agree on the scenario.
@@ -195,6 +255,34 @@ class ExperienceLibrary:
                 if path != whole:
                     path.unlink()
 
+    @contextmanager
+    def locked(self, share: Share = WHOLE) -> Iterator[None]:
+        """Lets nobody else add to the library within the block, but for other shares of the same.
+
+        The lock ends with the process that holds it, however that dies.
+
+        Raises:
+            LibraryError: Somebody else is adding to it, or the folder cannot be written.
+        """
+        path = self.path / f"_collecting-{share.index}-of-{share.count}.lock"
+        division = f"-of-{share.count}.lock"
+        others = [p for p in self.path.glob("_collecting-*.lock") if not p.name.endswith(division)]
+        lock = FileLock(path, timeout=0)
+        with readable_errors(path, "lock"):
+            try:
+                lock.acquire()
+                for other in others:
+                    FileLock(other, timeout=PATIENCE_S).acquire().lock.release()
+            except Timeout as error:
+                lock.release()
+                raise LibraryError(
+                    f"another process is adding to {self.path} (it holds {error.lock_file}); wait"
+                    " for it or stop it, or give each collection a --share of its own"
+                ) from None
+        with lock:
+            lock.release()  # The context holds it a second time.
+            yield
+
     def create(self) -> None:
         """Makes the folder if it is not there.
 
@@ -203,3 +291,52 @@ class ExperienceLibrary:
         """
         with readable_errors(self.path, "create the folder"):
             self.path.mkdir(parents=True, exist_ok=True)
+
+
+def merge_libraries(sources: Sequence[ExperienceLibrary], output: Path) -> int:
+    """Writes all rows of some libraries of one scenario into one file.
+
+    A row that several libraries hold with the same values is written once. The rows are sorted by
+    environment and keep their order within it.
+
+    Args:
+        sources: One or more libraries.
+        output: A file that does not exist yet, with the suffix .parquet.
+
+    Returns:
+        The number of rows written.
+
+    Raises:
+        LibraryError: The scenarios differ, two libraries hold different results of the same
+            reach, or a file cannot be read or written.
+    """
+    if output.suffix != SUFFIX:
+        raise LibraryError(f"the merged file needs the suffix {SUFFIX}, got {output}")
+    if os.path.exists(output):
+        raise LibraryError(f"{output} exists; delete it or choose another name")
+    header = sources[0].header()
+    merged: dict[str, ReachRecord] = {}
+    for source in sources:
+        digest = source.header().scenario_digest
+        if digest != header.scenario_digest:
+            raise LibraryError(
+                f"{source.path} holds scenario {digest}, but {sources[0].path} holds"
+                f" {header.scenario_digest}; merge libraries of one scenario only"
+            )
+        for record in source.records():
+            earlier = merged.setdefault(record.key, record)
+            if _content(earlier) != _content(record):
+                raise LibraryError(
+                    f"{source.path} holds another result of reach {record.key} than an earlier"
+                    " library; find out which one is right before merging"
+                )
+    rows = sorted(merged.values(), key=lambda record: (record.stream, record.environment))
+    with readable_errors(output.parent, "create the folder"):
+        output.parent.mkdir(parents=True, exist_ok=True)
+    write_atomically(output, lambda temporary: write_table(to_table(rows, header), temporary))
+    return len(rows)
+
+
+def _content(record: ReachRecord) -> str:
+    """Returns everything but the wall time as text, in which NaN equals NaN."""
+    return repr(dataclasses.replace(record, wall_time_s=0.0))

@@ -3,22 +3,37 @@
 from collections import Counter
 from dataclasses import dataclass
 
-from lic_drake.experience.added import Addition, additions
-from lic_drake.experience.journal import unfinished_reaches
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.intervals import wilson_interval
+from lic_drake.reach.request import SIMULATION
+
+
+@dataclass(frozen=True, kw_only=True)
+class SourceSummary:
+    """The rows of one source that is not the simulation.
+
+    Attributes:
+        source: Who made them.
+        reaches: Number of rows.
+        successes: How many of them reached their goal.
+        weights: How many simulated reaches a row counts as, the different values, sorted.
+    """
+
+    source: str
+    reaches: int
+    successes: int
+    weights: tuple[float, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
 class LibrarySummary:
-    """What a library holds.
+    """What a library holds; all numbers but `added` are of simulated reaches.
 
     Attributes:
         category: Clutter category.
         robot: Robot.
         scenario: Digest of the scenario.
         reaches: Number of rows.
-        journalled: Number of finished reaches of interrupted tasks, not yet in a shard.
         shards: Number of Parquet files.
         streams: Seed streams of the environments, sorted.
         environments: Number of different environments.
@@ -31,14 +46,13 @@ class LibrarySummary:
         wall_time_s: Wall time of all reaches, seconds.
         lic_drake_versions: Versions that simulated the reaches, sorted.
         drake_versions: Versions of Drake that simulated the reaches, sorted.
-        added: Records of real or other simulated robots, which no other number here counts.
+        added: Rows of real or other simulated robots, by source.
     """
 
     category: str
     robot: str
     scenario: str
     reaches: int
-    journalled: int
     shards: int
     streams: tuple[str, ...]
     environments: int
@@ -51,12 +65,12 @@ class LibrarySummary:
     wall_time_s: float
     lic_drake_versions: tuple[str, ...]
     drake_versions: tuple[str, ...]
-    added: tuple[Addition, ...]
+    added: tuple[SourceSummary, ...]
 
     @property
     def success_rate(self) -> float:
-        """Share of reaches that arrived at their goal."""
-        return self.successes / self.reaches
+        """Share of reaches that arrived at their goal; NaN without any."""
+        return self.successes / self.reaches if self.reaches else float("nan")
 
 
 def summarize(library: ExperienceLibrary) -> LibrarySummary:
@@ -65,15 +79,27 @@ def summarize(library: ExperienceLibrary) -> LibrarySummary:
     Raises:
         LibraryError: There is no library, it is empty, or it cannot be read.
     """
-    columns = library.columns()
+    everything = library.columns()
+    is_simulated = everything["source"] == SIMULATION
+    columns = {name: values[is_simulated] for name, values in everything.items()}
     reaches = len(columns["key"])
+    added = []
+    for source in sorted(set(everything["source"]) - {SIMULATION}):
+        of_source = everything["source"] == source
+        added.append(
+            SourceSummary(
+                source=source,
+                reaches=int(of_source.sum()),
+                successes=int(everything["success"][of_source].sum()),
+                weights=tuple(sorted(set(everything["weight"][of_source].tolist()))),
+            )
+        )
     successes = int(columns["success"].sum())
     return LibrarySummary(
-        category=str(columns["category"][0]),
-        robot=str(columns["robot"][0]),
-        scenario=str(columns["scenario"][0]),
+        category=str(everything["category"][0]),
+        robot=str(everything["robot"][0]),
+        scenario=str(everything["scenario"][0]),
         reaches=reaches,
-        journalled=unfinished_reaches(library.path),
         shards=len(library.shard_paths()),
         streams=tuple(sorted(set(columns["stream"]))),
         environments=len(set(zip(columns["stream"], columns["environment"], strict=True))),
@@ -88,5 +114,5 @@ def summarize(library: ExperienceLibrary) -> LibrarySummary:
         wall_time_s=float(columns["wall_time_s"].sum()),
         lic_drake_versions=tuple(sorted(set(columns["lic_drake_version"]))),
         drake_versions=tuple(sorted(set(columns["drake_version"]))),
-        added=additions(library),
+        added=tuple(added),
     )

@@ -14,6 +14,9 @@ from lic_drake.reach.start import IN_PLANE, IN_SPACE, POSE_AXES, Start
 from lic_drake.robots.arm import Arm
 from lic_drake.types import Vector
 
+SIMULATION = "simulation"
+"""Source of the records that lic_drake has simulated."""
+
 OUTCOMES = ("reached", "stuck", "force", "timeout", "diverged", "invalid_start", "unreachable")
 """How a reach can end: at the goal; without progress; by the force stop; out of time; by a
 failure of the simulator; before it began, because the arm cannot stand at the start or because
@@ -166,9 +169,9 @@ def _read_after(record: "ReachRecord", angles: int) -> list[tuple[Start, ...]]:
     return found
 
 
-def _later(unit: str, doc: str) -> float:
-    """Returns a column of schema version 3; 0 in the plane and in tables from before it."""
-    column: float = field(default=0.0, metadata={"unit": unit, "doc": doc, "since": 3})
+def _in_space(unit: str, doc: str) -> float:
+    """Returns a column that is 0 in the plane."""
+    column: float = field(default=0.0, metadata={"unit": unit, "doc": doc})
     return column
 
 
@@ -218,28 +221,33 @@ class ReachRecord:
     detail: str = field(metadata={"unit": "", "doc": "why a reach diverged or never began"})
     lic_drake_version: str = field(metadata={"unit": "", "doc": "version of lic_drake"})
     drake_version: str = field(metadata={"unit": "", "doc": "version of Drake"})
-    base_x: float = field(default=0.0, metadata={"unit": "m", "doc": "base p_WR", "since": 2})
-    base_y: float = field(default=0.0, metadata={"unit": "m", "doc": "base p_WR", "since": 2})
+    base_x: float = field(default=0.0, metadata={"unit": "m", "doc": "base p_WR"})
+    base_y: float = field(default=0.0, metadata={"unit": "m", "doc": "base p_WR"})
     after: tuple[float, ...] = field(
         default=(),
         metadata={
             "unit": "m, m, rad, m, m",
             "doc": "x0, p_WR and, in space, torso of each reach that went before",
-            "since": 2,
         },
     )
-    torso: float = _later("m", "height of the torso")
-    start_z: float = _later("m", "start pose x0")
-    start_qw: float = _later("", "start pose x0, quaternion; all 0 in the plane")
-    start_qx: float = _later("", "start pose x0, quaternion")
-    start_qy: float = _later("", "start pose x0, quaternion")
-    start_qz: float = _later("", "start pose x0, quaternion")
-    final_z: float = _later("m", "final hand pose x_inf")
-    final_qw: float = _later("", "final hand pose x_inf, quaternion; all 0 in the plane")
-    final_qx: float = _later("", "final hand pose x_inf, quaternion")
-    final_qy: float = _later("", "final hand pose x_inf, quaternion")
-    final_qz: float = _later("", "final hand pose x_inf, quaternion")
-    final_vz: float = _later("m/s", "mean tip velocity of the last second of motion")
+    torso: float = _in_space("m", "height of the torso")
+    start_z: float = _in_space("m", "start pose x0")
+    start_qw: float = _in_space("", "start pose x0, quaternion; all 0 in the plane")
+    start_qx: float = _in_space("", "start pose x0, quaternion")
+    start_qy: float = _in_space("", "start pose x0, quaternion")
+    start_qz: float = _in_space("", "start pose x0, quaternion")
+    final_z: float = _in_space("m", "final hand pose x_inf")
+    final_qw: float = _in_space("", "final hand pose x_inf, quaternion; all 0 in the plane")
+    final_qx: float = _in_space("", "final hand pose x_inf, quaternion")
+    final_qy: float = _in_space("", "final hand pose x_inf, quaternion")
+    final_qz: float = _in_space("", "final hand pose x_inf, quaternion")
+    final_vz: float = _in_space("m/s", "mean tip velocity of the last second of motion")
+    source: str = field(
+        default=SIMULATION, metadata={"unit": "", "doc": "who made the reach: simulation, a robot"}
+    )
+    weight: float = field(
+        default=1.0, metadata={"unit": "", "doc": "how many simulated reaches the row counts as"}
+    )
 
     @property
     def in_space(self) -> bool:

@@ -5,6 +5,7 @@ import math
 import time
 from functools import cache
 from importlib.metadata import version
+from typing import Any
 
 import numpy as np
 
@@ -149,7 +150,7 @@ def make_record(request: ReachRequest, result: ReachResult, wall_time_s: float) 
     )
 
 
-def _pose_columns(name: str, x: Vector) -> dict[str, float]:
+def _pose_columns(name: str, x: Vector) -> dict[str, Any]:
     """Returns the columns of a hand pose, (x, y, phi) or position and quaternion."""
     axes = POSE_AXES[len(x)]
     columns = {f"{name}_{axis}": float(value) for axis, value in zip(axes, x, strict=True)}

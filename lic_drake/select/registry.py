@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from lic_drake.errors import RequestError
 from lic_drake.estimate.features import FeatureMap, features_of
 from lic_drake.estimate.registry import estimator_names, make_estimator
-from lic_drake.experience.second_reach import pair_reaches
+from lic_drake.experience.pairs import pair_reaches
 from lic_drake.robots.arm import Arm
 from lic_drake.robots.planar import PlanarArm
 from lic_drake.robots.pr2 import Pr2Arm
@@ -94,7 +94,6 @@ def make_selector(
     rng: np.random.Generator | None = None,
     category: str = "cylinder-clutter",
     pairs: Mapping[str, NDArray[Any]] | None = None,
-    added: Mapping[str, NDArray[Any]] | None = None,
 ) -> Selector:
     """Returns a strategy, fitted to a library if it learns from one.
 
@@ -104,9 +103,8 @@ def make_selector(
         columns: Columns of the experience library; not needed by the baselines.
         rng: Source of draws for RND; by default always the same ones.
         category: Clutter category, which says what LIC observes.
-        pairs: Columns of D2 for LIC-2, see `lic_drake.experience.real_pairs`; by default it is
+        pairs: Columns of D2 for LIC-2, see `lic_drake.experience.pairs`; by default it is
             made from the single reaches of `columns`, as in the paper.
-        added: Experience from elsewhere, see `lic_drake.experience.added.added_columns`.
 
     Raises:
         RequestError: The strategy is unknown or has no library to learn from, or there are pairs
@@ -116,8 +114,8 @@ def make_selector(
     first, later = split_method(method)
     if later is not None:
         return FallbackSelector(
-            first=make_selector(first, arm, columns, rng, category, pairs, added),
-            later=make_selector(later, arm, columns, rng, category, pairs, added),
+            first=make_selector(first, arm, columns, rng, category, pairs),
+            later=make_selector(later, arm, columns, rng, category, pairs),
             method=method,
         )
     if not needs_library(method):
@@ -137,9 +135,8 @@ def make_selector(
         )
     if features.second is not None and not only_first:
         pairs = pair_reaches(columns) if pairs is None else pairs
-        added_pairs = None if added is None else pair_reaches(added)
-        second = fit_model(estimator, features.second, pairs, added_pairs)
-    first_model = fit_model(estimator, features.first, columns, added)
+        second = fit_model(estimator, features.second, pairs)
+    first_model = fit_model(estimator, features.first, columns)
     if isinstance(arm, PlanarArm):
         return PlanarLic(arm, first_model, second, method=method)
     if isinstance(arm, Pr2Arm):
@@ -151,22 +148,18 @@ def fit_model(
     estimator: str,
     features: FeatureMap,
     columns: Mapping[str, NDArray[Any]],
-    added: Mapping[str, NDArray[Any]] | None = None,
 ) -> SuccessModel:
     """Returns an estimator fitted to the columns of a library.
 
-    Its settings come from the simulated rows; experience from elsewhere changes the estimate, by
-    its weight, but no setting.
+    Its settings come from the simulated rows; those of other sources change the estimate, by their
+    weight, but no setting.
 
     Args:
         estimator: Its name, see `estimator_names`.
         features: What x is made of.
         columns: Of a library D1, or the pairs D2 where the features observe a first reach.
-        added: The same of experience from elsewhere, with weights.
     """
     rows = features.rows(columns)
-    if added is not None and len(added["success"]):
-        rows = rows.join(features.rows({**added, "source": np.full(len(added["success"]), "")}))
     # A library without any simulated row chooses its settings from all.
     known = rows.simulated if rows.simulated.any() else np.ones_like(rows.simulated)
     fitted = make_estimator(estimator, features).fit(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lic_drake.errors import RequestError
-from lic_drake.experience.second_reach import SHOWN
+from lic_drake.experience.pairs import SHOWN
 from lic_drake.reach.request import ReachRecord
 from lic_drake.reach.start import IN_PLANE, POSE_AXES, Start
 from lic_drake.reach.start import Starts as StartBatch
@@ -29,7 +29,7 @@ class FailedReach:
     Attributes:
         start: Its start.
         shown: Values that an observation o may be made of, by the names of the records' columns,
-            see `lic_drake.experience.second_reach.SHOWN`; the final ones are only there if it
+            see `lic_drake.experience.pairs.SHOWN`; the final ones are only there if it
             began at all.
     """
 

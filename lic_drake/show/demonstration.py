@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from lic_drake.evaluate.trial import Attempt, run_trial
-from lic_drake.experience.added import added_columns
 from lic_drake.experience.files import check_writable
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.perception.cameras import make_renderer
@@ -91,9 +90,9 @@ def demonstrate(
     )
 
     def select_with(name: str) -> Selector:
-        rng, added = np.random.default_rng(seed), added_columns(library)
+        rng = np.random.default_rng(seed)
         columns, category = library.columns(), scenario.category
-        return make_selector(name, scenario.arm(), columns, rng, category, added=added)
+        return make_selector(name, scenario.arm(), columns, rng, category)
 
     selector = select_with(method)
     observer = None

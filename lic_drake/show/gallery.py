@@ -13,7 +13,6 @@ from matplotlib.figure import Figure
 import lic_drake
 from lic_drake.evaluate.paper import label
 from lic_drake.evaluate.trial import Attempt, run_trial
-from lic_drake.experience.added import added_columns
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.rollout import simulate_request
 from lic_drake.reach.scenario import Scenario
@@ -129,7 +128,6 @@ def choose_exhibits(
         library.columns(),
         np.random.default_rng(first_environment),
         scenario.category,
-        added=added_columns(library),
     )
     wanted = {True: each, False: each}
     exhibits = []

@@ -21,7 +21,7 @@ from lic_drake.estimate.local import LocalEstimator
 from lic_drake.estimate.nearest_neighbours import NearestNeighbours
 from lic_drake.estimate.registry import make_estimator
 from lic_drake.estimate.rows import feature_scale, group_folds
-from lic_drake.experience.second_reach import pair_reaches
+from lic_drake.experience.pairs import pair_reaches
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.robots.registry import get_robot
 from lic_drake.select.baselines import corridor_cost

@@ -19,7 +19,7 @@ from lic_drake.estimate.nearest_neighbours import NearestNeighbours
 from lic_drake.estimate.registry import make_estimator
 from lic_drake.evaluate.statistics import count, mcnemar
 from lic_drake.evaluate.table import Table, rate_cells
-from lic_drake.experience.second_reach import FIRST_PREFIX, SHOWN, pair_reaches
+from lic_drake.experience.pairs import FIRST_PREFIX, SHOWN, pair_reaches
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 from lic_drake.types import Vector

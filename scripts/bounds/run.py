@@ -38,7 +38,7 @@ def main() -> None:
                 ReachRequest(scenario, args.stream, environment, p_WG, start) for start in grid
             ]
     folder = args.results / "bounds" / args.scenario / "factorial"
-    records = keep_reaches(requests, folder, scenario, args.workers)
+    records = keep_reaches(requests, folder, args.workers)
     won = sum(record.success for record in records)
     print(f"{won} of {len(requests)} reaches at the goal; kept in {folder}")
 

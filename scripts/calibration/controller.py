@@ -50,7 +50,7 @@ def main() -> None:
     for cylinders, published in PUBLISHED.items():
         scenario = load_scenario("calibration-field", f"{{clutter: {{num_fixed: {cylinders}}}}}")
         requests = field_requests(scenario, args.fields)
-        records = keep_reaches(requests, args.out / f"fixed-{cylinders}", scenario, args.workers)
+        records = keep_reaches(requests, args.out / f"fixed-{cylinders}", args.workers)
         rate, interval, _ = rate_cells(count(np.array([record.success for record in records])))
         outcomes = Counter(record.outcome for record in records).most_common()
         ended = ", ".join(f"{name} {n}" for name, n in outcomes)

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from lic_drake.evaluate.batch import random_requests
 from lic_drake.evaluate.statistics import count
 from lic_drake.evaluate.table import rate_cells
+from lic_drake.evaluate.trial import random_requests
 from lic_drake.reach.scenario import load_scenario
 from scripts.common import add_workers, keep_reaches, make_parser, run_script
 
@@ -34,7 +34,7 @@ def main() -> None:
     scenario = load_scenario(args.scenario, args.set)
     goals = 1 if scenario.task.goal_area is None else GOALS
     requests = random_requests(scenario, "training", args.environments, goals)
-    records = keep_reaches(requests, args.results, scenario, args.workers)
+    records = keep_reaches(requests, args.results, args.workers)
     rate, interval, counts = rate_cells(count(np.array([record.success for record in records])))
     print(
         f"RND, first attempt: {rate} % ({counts}, 90 % interval {interval};"

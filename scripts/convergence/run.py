@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from lic_drake.evaluate.batch import random_requests
 from lic_drake.evaluate.statistics import count, mcnemar
 from lic_drake.evaluate.table import rate_cells
+from lic_drake.evaluate.trial import random_requests
 from lic_drake.reach.pointing_starts import pointing_starts
 from lic_drake.reach.request import ReachRequest
 from lic_drake.reach.scenario import Scenario, load_scenario
@@ -76,7 +76,7 @@ def main() -> None:
         else:
             requests = near_requests(scenario, args.reaches)
         folder = args.results / "".join(c if c.isalnum() else "-" for c in name).strip("-")
-        rows[name] = keep_reaches(requests[: args.reaches], folder, scenario, args.workers)
+        rows[name] = keep_reaches(requests[: args.reaches], folder, args.workers)
     last = list(rows)[-1]
     reference = np.array([record.success for record in rows[last]])
     lines = [

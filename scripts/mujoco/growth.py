@@ -2,16 +2,14 @@
 
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from itertools import groupby
-from multiprocessing import get_context
 
 import numpy as np
 
 from lic_drake.control.surface_taxels import make_taxels
-from lic_drake.evaluate.batch import random_requests
-from lic_drake.experience.workers import prepare_worker
+from lic_drake.evaluate.trial import random_requests
+from lic_drake.experience.workers import LocalWorkers
 from lic_drake.reach.request import ReachRequest, is_within_reach
 from lic_drake.reach.scenario import Scenario
 from scripts.mujoco.engines import Engine
@@ -103,8 +101,7 @@ def _time_pool(
 ) -> float:
     """Returns the wall seconds for all reaches, an environment a task, with warm processes."""
     tasks = [list(g) for _, g in groupby(requests, key=lambda r: (r.stream, r.environment))]
-    context = get_context("forkserver")
-    with ProcessPoolExecutor(workers, context, initializer=prepare_worker) as executor:
+    with LocalWorkers(workers) as executor:
         first = [executor.submit(_run_task, engine, scenario, tasks[0][:1]) for _ in range(workers)]
         for future in first:
             future.result()

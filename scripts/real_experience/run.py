@@ -8,7 +8,7 @@ on where it was.
 """
 
 import shutil
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -16,14 +16,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from lic_drake.errors import LibraryError
-from lic_drake.evaluate.batch import random_requests
 from lic_drake.evaluate.experiment import Evaluation, run_evaluation
 from lic_drake.evaluate.statistics import Count, count
 from lic_drake.evaluate.table import Table, rate_cells
+from lic_drake.evaluate.trial import random_requests
 from lic_drake.evaluate.trials import TrialTable, read_trials
-from lic_drake.experience.added import add_records
-from lic_drake.experience.added_rows import COLUMNS
+from lic_drake.experience.add import add_rows, columns_of
 from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.experience.workers import LocalWorkers
 from lic_drake.paths import shipped_library
 from lic_drake.show.figures import save_figure
 from scripts.common import (
@@ -86,11 +86,12 @@ def evaluate_learned(
             tried = replace(tried, overrides="")
         else:
             shutil.copytree(evaluation.experience, library.path)
-            plane = [name for name, column in COLUMNS.items() if column.plane]
-            rows = [{name: asdict(record)[name] for name in plane} for record in records]
+            names = columns_of(library.scenario())
+            rows = [{name: getattr(record, name) for name in names} for record in records]
             if rows:
-                add_records(library, rows, source="real", weight=learned.weight)
-        run_evaluation(tried, workers, print)
+                add_rows(library, rows, source="real", weight=learned.weight)
+        with LocalWorkers(workers) as pool:
+            run_evaluation(tried, pool, print)
 
 
 def success_table(counts: dict[Learned, Count], random: Count) -> Table:
@@ -178,7 +179,7 @@ def main() -> None:
     if not args.tabulate:
         scenario = evaluation.scenario()
         requests = random_requests(scenario, "training", args.records, 1)
-        keep_reaches(requests, real.path, scenario, args.workers)
+        keep_reaches(requests, real.path, args.workers)
         for point in points:
             print(point.variant, flush=True)
             evaluate_learned(point, real, evaluation, args.workers)

@@ -18,10 +18,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from lic_drake.experience.cluster import Cluster
-from lic_drake.experience.collect import collect
-from lic_drake.experience.grid import CollectionRequest
-from lic_drake.experience.journal import Journal
+from lic_drake.experience.collect import CollectionRequest, collect
+from lic_drake.experience.dask_workers import DaskWorkers
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 from lic_drake.reach.request import ReachRecord, ReachRequest
@@ -130,20 +128,15 @@ def measure_all(tasks: int) -> tuple[dict[int, Cost], dict[str, Cost]]:
     with (
         SubprocessCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as local,
         Client(local, set_as_default=False) as client,
-        Cluster(local.scheduler_address) as cluster,
+        DaskWorkers(local.scheduler_address) as cluster,
         TemporaryDirectory() as folder,
     ):
         client.wait_for_workers(2)
 
         def fill(environments: int, **grid: Any) -> None:
             request = CollectionRequest(scenario=scenario, environments=environments, **grid)
-            collect(
-                ExperienceLibrary(Path(folder) / f"{environments}"),
-                request,
-                workers=cluster.num_workers,
-                make_executor=cluster.make_executor,
-                reach=instant_reach,
-            )
+            library = ExperienceLibrary(Path(folder) / f"{environments}")
+            collect(library, request, cluster, reach=instant_reach)
 
         fill(4)  # The workers import what they need.
         client.run_on_scheduler(count_traffic)
@@ -168,10 +161,6 @@ def disk_section() -> list[str]:
     library = ExperienceLibrary(shipped_library("cylinder-clutter"))
     records = library.records()
     shard = sum(path.stat().st_size for path in library.shard_paths()) / len(records)
-    with TemporaryDirectory() as folder, Journal(Path(folder) / "journal") as journal:
-        for record in records:
-            journal.append(record)
-        line = (Path(folder) / "journal").stat().st_size / len(records)
     return [
         "## Disk",
         "",
@@ -180,8 +169,6 @@ def disk_section() -> list[str]:
         "| | bytes per reach | |",
         "|---|---|---|",
         f"| shard (Parquet) | {shard:.0f} | {shard * MILLION / 1e6:.0f} MB a million |",
-        f"| journal, while an environment is at work | {line:.0f}"
-        f" | {line * PER_TASK / 1e3:.0f} kB per worker |",
     ]
 
 
@@ -205,8 +192,7 @@ def task_section(idle: dict[int, Cost], costs: dict[str, Cost]) -> list[str]:
             for name, cost in costs.items()
         ),
         "",
-        f"Recording a reach (journal, shard, looking for the stop sign) takes"
-        f" {1e3 * record_s:.2f} ms of a worker's time.",
+        f"A reach takes {1e3 * record_s:.2f} ms beside its simulation.",
         "",
         "| idle workers | scheduler CPU, ms/s | messages/s |",
         "|---|---|---|",
@@ -237,9 +223,6 @@ def saturation_section(idle: dict[int, Cost], cost: Cost, reach_s: float) -> lis
         "| reaches a task | task, s | workers at saturation |",
         "|---|---|---|",
         *(f"| {n} | {n * reach_s:.3g} | {n * reach_s / busiest_s:,.0f} |" for n in (1, PER_TASK)),
-        "",
-        "The load on a shared file system (one journal line and one look at the lock per reach)"
-        " was not measured.",
     ]
 
 

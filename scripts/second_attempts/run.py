@@ -41,7 +41,7 @@ def collect(
             chosen = selector.select(Situation(p_WG=p_WG, starts=starts))
             firsts.append(ReachRequest(scenario, "training", environment, p_WG, chosen.start))
     print(f"{len(firsts)} first attempts chosen", flush=True)
-    records = keep_reaches(firsts, output, scenario, workers)
+    records = keep_reaches(firsts, output, workers)
     seconds: list[ReachRequest] = []
     for first, record in zip(firsts, records, strict=True):
         if record.success or not np.isfinite(record.final_x):
@@ -49,7 +49,7 @@ def collect(
         instance = scenario.sample_instance("training", first.environment)
         grid = make_starts(scenario, instance).grid
         seconds += [first.then(start) for start in grid]
-    keep_reaches(seconds, output, scenario, workers)
+    keep_reaches(seconds, output, workers)
     return len(seconds)
 
 

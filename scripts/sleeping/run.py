@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lic_drake.evaluate.batch import random_requests
 from lic_drake.evaluate.statistics import mcnemar
+from lic_drake.evaluate.trial import random_requests
 from lic_drake.reach.scenario import load_scenario
 from scripts.common import add_workers, keep_reaches, make_parser, run_script, write_report
 
@@ -31,7 +31,7 @@ def main() -> None:
     scenario = load_scenario("cylinder-clutter")
     requests = random_requests(scenario, "calibration", -(-args.count // 5), 5)[: args.count]
     asleep, awake = (
-        keep_reaches(requests, args.reaches / name, scenario, args.workers, sleep=sleep)
+        keep_reaches(requests, args.reaches / name, args.workers, sleep=sleep)
         for name, sleep in (("asleep", True), ("awake", False))
     )
     pairs = [

@@ -1,16 +1,13 @@
 """The subcommands with cylinder-aperture-clutter, where the base moves."""
 
 import json
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
-from support.fake_reach import FakeReach, make_record, make_request
+from support.fake_reach import FakeReach, collect_here, make_record, make_request
 
-import lic_drake.experience.collect as dut
 from lic_drake.cli.main import main
 from lic_drake.evaluate.trials import read_trials
 from lic_drake.experience.store import ExperienceLibrary
@@ -39,10 +36,7 @@ def test_collect_makes_15_reaches_in_each_environment(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     reach = FakeReach(log=tmp_path / "calls")
-    make_executor = partial(ThreadPoolExecutor, max_workers=1)
-    monkeypatch.setattr(
-        dut, "collect", partial(dut.collect, reach=reach, make_executor=make_executor)
-    )
+    collect_here(monkeypatch, reach)
     path = tmp_path / "new"
     assert main(["collect", str(path), "--scenario", NAME, "--environments", "4"]) == 0
     output = capsys.readouterr().out

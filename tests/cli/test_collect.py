@@ -5,16 +5,13 @@ import subprocess
 import sys
 import termios
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from pathlib import Path
 
 import pytest
-from support.fake_reach import FakeReach, comparable, expected_records, make_request
+from support.fake_reach import FakeReach, collect_here, comparable, expected_records, make_request
 
-import lic_drake.experience.collect as dut
 from lic_drake.cli.main import main
-from lic_drake.experience.grid import REQUEST_FILE, read_request
+from lic_drake.experience.collect import REQUEST_FILE, read_request
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.scenario import load_scenario
 
@@ -30,10 +27,8 @@ def reach(tmp_path: Path) -> FakeReach:
 
 @pytest.fixture
 def collect(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, reach: FakeReach) -> Collect:
-    """Runs `lic collect` with fake reaches on threads."""
-    make_executor = partial(ThreadPoolExecutor, max_workers=1)
-    fake = partial(dut.collect, reach=reach, make_executor=make_executor)
-    monkeypatch.setattr(dut, "collect", fake)
+    """Runs `lic collect` with fake reaches in this process."""
+    collect_here(monkeypatch, reach)
     return lambda *options: main(["collect", str(tmp_path / "new"), *options])
 
 
@@ -111,32 +106,31 @@ def test_failed_environments_are_listed_and_make_exit_code_1(
     reach: FakeReach,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    failing = FakeReach(log=reach.log, failing_environment=1)
-    monkeypatch.setattr(dut, "collect", partial(dut.collect, reach=failing))
+    collect_here(monkeypatch, FakeReach(log=reach.log, failing_environment=1))
     assert collect("--environments", "3", *SMALL) == 1
     output, error = capsys.readouterr()
     assert "24 of 36 reaches" in output
-    assert "lic: environment 1 failed: ArithmeticError: no such environment\n" in error
+    assert "lic: environment training-000001 failed: ArithmeticError: no such env" in error
     assert "the library is incomplete; run the same command to try again" in error
 
 
-def test_a_shard_is_a_share_of_the_environments(
+def test_a_share_is_a_part_of_the_environments(
     collect: Collect, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert collect("--environments", "5", *SMALL, "--shard", "2/3") == 0
+    assert collect("--environments", "5", *SMALL, "--share", "2/3") == 0
     output = capsys.readouterr().out
     assert "2 environments x 4 goals x 3 starts = 24 reaches into" in output
     assert "24 of 24 reaches (24 new in " in output
     assert read_request(tmp_path / "new" / REQUEST_FILE) == make_request(environments=5)
-    assert collect("--shard", "0/3") == 2
-    assert "a shard is k/n with k from 1 to n, got 0/3; start the job" in capsys.readouterr().err
+    assert collect("--share", "0/3") == 2
+    assert "a share is k/n with k from 1 to n, got 0/3; start the job" in capsys.readouterr().err
 
 
 def test_a_scheduler_that_is_not_there_is_one_line(
     collect: Collect, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pytest.importorskip("distributed", reason="Dask is missing: pip install 'lic_drake[cluster]'")
-    monkeypatch.setattr("lic_drake.experience.cluster.CONNECT_S", 0.5)
+    monkeypatch.setattr("lic_drake.experience.dask_workers.CONNECT_S", 0.5)
     with socket.create_server(("127.0.0.1", 0)) as silent:
         address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
         for wrong, reason in ((address, "silence for 0.5 s"), ("node1", "missing port number")):
@@ -190,7 +184,7 @@ def test_a_real_reach_is_collected_with_a_progress_bar_on_a_terminal(tmp_path: P
     os.close(terminal)
     assert process.returncode == 0
     assert "1 of 1 reaches (1 new" in output
-    assert "| 1/1" in shown
+    assert "1/1 reaches" in shown
     assert "reaches/min" in shown
     (record,) = ExperienceLibrary(library).records()
     assert (record.outcome, record.duration_s) == ("timeout", pytest.approx(0.2, abs=0.05))

@@ -117,7 +117,7 @@ WRONG = [
     ("select --goal 0.6 0.1 --library {none}", "make one with: lic collect"),
     ("select --goal inf 0.1", "finite"),
     ("collect {file}", "cannot"),
-    ("collect {none} --shard 3/2", "shard"),
+    ("collect {none} --share 3/2", "share"),
     ("collect {none} --environments 0", "from 1 to"),
     ("experience info {none}", "make one with: lic collect"),
     ("experience check {none}", "make one with: lic collect"),
@@ -182,4 +182,4 @@ def test_an_evaluation_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str
     rates = strict_json(output)["rates"]
     assert [(rate["method"], rate["trials"]) for rate in rates] == [("cost", 2), ("rnd", 2)]
     assert [rate["p_value"] is None for rate in rates] == [False, True]
-    assert "blocks" in error
+    assert "2/2 environments" in error

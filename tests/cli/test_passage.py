@@ -1,15 +1,12 @@
 """The subcommands with passage-clutter, whose environments offer their own goals."""
 
 import json
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import pytest
-from support.fake_reach import FakeReach, make_record, make_request
+from support.fake_reach import FakeReach, collect_here, make_record, make_request
 
-import lic_drake.experience.collect as dut
 from lic_drake.cli.main import main
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.scenario import load_scenario
@@ -36,10 +33,7 @@ def test_collect_makes_the_papers_1680_reaches(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     reach = FakeReach(log=tmp_path / "calls")
-    make_executor = partial(ThreadPoolExecutor, max_workers=1)
-    monkeypatch.setattr(
-        dut, "collect", partial(dut.collect, reach=reach, make_executor=make_executor)
-    )
+    collect_here(monkeypatch, reach)
     path = tmp_path / "new"
     command = ["collect", str(path), "--scenario", "passage-clutter", "--environments", "120"]
     assert main(command) == 0

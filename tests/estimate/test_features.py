@@ -10,7 +10,7 @@ from lic_drake.estimate.features import (
     FeatureMap,
     features_of,
 )
-from lic_drake.experience.second_reach import SHOWN
+from lic_drake.experience.pairs import SHOWN
 
 
 @pytest.fixture

@@ -1,5 +1,3 @@
-from collections.abc import Callable
-from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +11,7 @@ from lic_drake.evaluate import experiment as dut
 from lic_drake.evaluate.experiment import Evaluation, run_evaluation
 from lic_drake.evaluate.trials import TrialRow, read_trials
 from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.experience.workers import LocalWorkers
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.scenario import load_scenario
 
@@ -35,26 +34,6 @@ def make_library(
     return library
 
 
-class HereExecutor:
-    """Does in this process, at once, what it is given."""
-
-    def __init__(
-        self, workers: int, *, mp_context: Any, initializer: Callable[..., None], initargs: Any
-    ) -> None:
-        initializer(*initargs)
-
-    def submit(self, function: Callable[..., Any], *args: Any) -> "Future[Any]":
-        future: Future[Any] = Future()
-        try:
-            future.set_result(function(*args))
-        except Exception as error:
-            future.set_exception(error)
-        return future
-
-    def shutdown(self, cancel_futures: bool) -> None:
-        pass
-
-
 @pytest.fixture
 def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Keys of the reaches simulated, which are made-up ones in this process."""
@@ -65,9 +44,6 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         return make_record(request)
 
     monkeypatch.setattr(dut, "run_reach", reach)
-    monkeypatch.setattr(dut, "ProcessPoolExecutor", HereExecutor)
-    monkeypatch.setattr(dut, "prepare_worker", lambda: None)
-    monkeypatch.setattr(dut, "_worker", None)
     return keys
 
 
@@ -118,7 +94,7 @@ def test_strategies_are_tried_at_the_same_goals_of_the_same_environments(
     # What was learned from the library: starts left of the middle.
     assert all(records[row.key].start_y > 0.0 for row in firsts if row.method == "gp1")
     assert any(records[row.key].start_y < 0.0 for row in firsts if row.method == "rnd")
-    assert lines[-1].startswith(f"  1/1 blocks, {len(rows)} attempts, gp1 ")
+    assert lines[-1].startswith(f"  3/3 environments, {len(rows)} attempts, gp1 ")
 
 
 def test_rows_agree_with_the_library_of_reaches(tmp_path: Path, calls: list[str]) -> None:
@@ -170,7 +146,7 @@ def test_run_again_it_simulates_nothing_and_gives_the_same_rows(
 def test_an_interrupted_evaluation_simulates_nothing_twice(
     tmp_path: Path, calls: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(dut, "REACHES_A_BLOCK", 1)
+    monkeypatch.setattr(dut, "SAY_S", 0.0)
     asked = evaluation(tmp_path, environments=5)
     expected = without_times(run_evaluation(replace(asked, results=tmp_path / "whole"), say=quiet))
     calls.clear()
@@ -183,14 +159,14 @@ def test_an_interrupted_evaluation_simulates_nothing_twice(
 
     with pytest.raises(KeyboardInterrupt):
         run_evaluation(asked, say=interrupt)
-    kept = asked.reaches.keys()
-    assert kept and kept < set(calls)
+    kept = set(asked.reaches.successes())
+    assert kept and kept == set(calls)
     assert not asked.trials_path.exists()
     calls.clear()
     assert without_times(run_evaluation(asked, say=quiet)) == expected
     assert not kept & set(calls)
     assert len(calls) == len(set(calls))
-    assert kept | set(calls) == asked.reaches.keys()
+    assert kept | set(calls) == asked.reaches.successes().keys()
     assert [path.name for path in asked.reaches.shard_paths()] == ["reaches.parquet"]
 
 
@@ -265,14 +241,12 @@ def test_apertures_are_evaluated_with_bases(tmp_path: Path, calls: list[str]) ->
     assert {row.method for row in rows} == {"rnd", "cost", "gp"}
 
 
-def test_two_processes_give_the_rows_and_reaches_of_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(dut, "REACHES_A_BLOCK", 1)
+def test_two_processes_give_the_rows_and_reaches_of_one(tmp_path: Path) -> None:
     results = []
     for workers in (1, 2):
         asked = evaluation(tmp_path, results=tmp_path / str(workers), goals=1)
-        rows = run_evaluation(asked, workers, quiet)
+        with LocalWorkers(workers) as pool:
+            rows = run_evaluation(asked, pool, quiet)
         results.append((without_times(rows), comparable(asked.reaches.records())))
     assert results[0] == results[1]
     assert len(results[0][0]) > 6
@@ -304,4 +278,4 @@ def test_what_is_wrong_in_a_worker_is_told_as_it_is(tmp_path: Path) -> None:
     content = shard.read_bytes()
     shard.write_bytes(content[: len(content) // 2])
     with pytest.raises(LibraryError, match="is damaged or not a Parquet file"):
-        run_evaluation(asked, 1, quiet)
+        run_evaluation(asked, say=quiet)

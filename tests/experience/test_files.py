@@ -6,7 +6,7 @@ import pytest
 
 from lic_drake.errors import LibraryError
 from lic_drake.experience import files
-from lic_drake.experience.files import open_locked, write_atomically
+from lic_drake.experience.files import write_atomically
 
 
 @pytest.mark.parametrize("call", ["fsync", "replace"])
@@ -44,12 +44,3 @@ def test_what_a_killed_writer_left_is_replaced(tmp_path: Path) -> None:
     (tmp_path / ".file.tmp").write_text("a longer half of a file")
     write_atomically(path, lambda temporary: temporary.write_text("new") and None)
     assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("file", "new")]
-
-
-def test_a_locked_file_is_refused_until_it_is_closed(tmp_path: Path) -> None:
-    path = tmp_path / "file"
-    first = open_locked(path, wait=False)
-    with pytest.raises(BlockingIOError):
-        open_locked(path, wait=False)
-    first.close()
-    open_locked(path, wait=False).close()

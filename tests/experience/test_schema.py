@@ -4,7 +4,6 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
@@ -15,17 +14,13 @@ from support.fake_reach import make_record, make_request
 from lic_drake.errors import LibraryError
 from lic_drake.experience.schema import (
     FIELDS,
-    SCHEMA,
     make_header,
     read_header,
     read_table,
-    schema_of,
     to_records,
     to_table,
     write_table,
 )
-from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.paths import shipped_library
 from lic_drake.reach.request import ReachRecord
 from lic_drake.reach.scenario import load_scenario, parse_scenario
 
@@ -45,12 +40,6 @@ VALUES = {
     bool: st.booleans(),
     tuple[float, ...]: st.lists(any_float | awkward_float, max_size=8).map(tuple),
 }
-NEW_IN_2 = ["base_x", "base_y", "after"]
-NEW_IN_3 = [
-    "torso",
-    *(f"start_{axis}" for axis in ("z", "qw", "qx", "qy", "qz")),
-    *(f"final_{axis}" for axis in ("z", "qw", "qx", "qy", "qz", "vz")),
-]
 any_record = st.fixed_dictionaries({name: VALUES[kind] for name, kind in FIELDS.items()}).map(
     lambda values: ReachRecord(**values)
 )
@@ -162,7 +151,7 @@ def _retyped(table: pa.Table) -> pa.Table:
     ("change", "message"),
     [
         (_foreign, "is not part of an experience library"),
-        (_newer, "has schema version 99, written by lic_drake 0.1.0; .* reads versions up to 3"),
+        (_newer, "has schema version 99, written by lic_drake 0.1.0; .* reads version 4:"),
         (_narrower, r"has other columns than this lic_drake writes \(peak_force\)"),
         (_retyped, r"has other columns than this lic_drake writes \(environment\)"),
     ],
@@ -182,69 +171,8 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
         read_table(tmp_path / "none.parquet")
 
 
-def _as_version_1(table: pa.Table) -> pa.Table:
-    """The table as it was before a base could move and reaches could follow each other."""
-    metadata = {**table.schema.metadata, b"lic_drake.schema_version": b"1"}
-    older = table.drop_columns([*NEW_IN_2, *NEW_IN_3])
-    return older.replace_schema_metadata(metadata)
-
-
-def _as_version_2(table: pa.Table) -> pa.Table:
-    """The table as it was before there was a robot in space."""
-    metadata = {**table.schema.metadata, b"lic_drake.schema_version": b"2"}
-    return table.drop_columns(NEW_IN_3).replace_schema_metadata(metadata)
-
-
-def test_a_table_of_version_1_is_read_with_a_base_at_the_origin_and_no_earlier_reach(
-    shard: Path,
-) -> None:
-    pq.write_table(_as_version_1(pq.read_table(shard)), shard)
-    assert read_header(shard).schema_version == 1
-    records = to_records(read_table(shard))
-    assert all((r.base_x, r.base_y, r.after) == (0.0, 0.0, ()) for r in records)
-    assert list(map(_bits, records)) == list(map(_bits, RECORDS))
-    assert read_table(shard).schema.equals(SCHEMA, check_metadata=False)
-    for columns in (["base_y"], ["after", "key", "base_x"], ["key"], []):
+def test_some_columns_are_read_in_the_order_that_is_asked_for(shard: Path) -> None:
+    for columns in (["weight", "key", "source"], []):
         assert read_table(shard, columns).column_names == columns
-        assert len(read_table(shard, columns)) == (len(RECORDS))
-
-
-def test_a_table_of_version_2_is_read_as_one_of_reaches_in_the_plane(shard: Path) -> None:
-    pq.write_table(_as_version_2(pq.read_table(shard)), shard)
-    assert read_header(shard).schema_version == 2
-    records = to_records(read_table(shard))
-    assert list(map(_bits, records)) == list(map(_bits, RECORDS))
-    assert not any(record.in_space for record in records)
-    assert all(getattr(record, name) == 0.0 for record in records for name in NEW_IN_3)
-
-
-@pytest.mark.parametrize("name", ["cylinder-clutter", "passage-clutter"])
-def test_the_shipped_libraries_are_read_whatever_their_version(name: str) -> None:
-    library = ExperienceLibrary(shipped_library(name))
-    columns = library.columns()
-    assert list(columns) == SCHEMA.names
-    assert not np.any([columns["base_x"], columns["base_y"]])
-    assert all(len(after) == 0 for after in columns["after"])
-    assert set(columns["scenario"]) == {library.header().scenario_digest}
-
-
-def test_a_table_of_version_1_has_the_columns_of_version_1(shard: Path) -> None:
-    table = pq.read_table(shard)
-    metadata = {**table.schema.metadata, b"lic_drake.schema_version": b"1"}
-    pq.write_table(table.replace_schema_metadata(metadata), shard)
-    with pytest.raises(
-        LibraryError, match=r"has other columns .* \(after, base_x, base_y, final_qw"
-    ):
-        read_table(shard)
-
-
-def test_the_schema_keeps_its_version() -> None:
-    # A change here means that older libraries cannot be read: raise SCHEMA_VERSION with it.
-    columns = ",".join(f"{item.name}:{item.type}" for item in SCHEMA)
-    assert columns.count(",") == 33 + len(NEW_IN_3)
-    second = ",".join(f"{item.name}:{item.type}" for item in schema_of(2))
-    assert columns == ",".join([second, *(f"{name}:double" for name in NEW_IN_3)])
-    first = ",".join(f"{item.name}:{item.type}" for item in schema_of(1))
-    assert first.count(",") == 30
-    assert columns.startswith(f"{first},base_x:double,base_y:double,after:list<")
-    assert columns.startswith("key:string,category:string,robot:string,scenario:string,stream")
+        assert len(read_table(shard, columns)) == len(RECORDS)
+    assert set(read_table(shard).column("source").to_pylist()) == {"simulation"}

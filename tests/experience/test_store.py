@@ -7,11 +7,9 @@ import pandas as pd
 import pytest
 from support.fake_reach import comparable, make_record, make_request
 
-from lic_drake.errors import LibraryError
-from lic_drake.experience.grid import REQUEST_FILE, write_request
-from lic_drake.experience.journal import Journal, journal_path
-from lic_drake.experience.lock import CollectionLock
-from lic_drake.experience.store import COMPACTED, ExperienceLibrary
+from lic_drake.errors import LibraryError, RequestError
+from lic_drake.experience.collect import REQUEST_FILE, write_request
+from lic_drake.experience.store import COMPACTED, ExperienceLibrary, Share, merge_libraries
 from lic_drake.reach.scenario import load_scenario
 
 REQUEST = make_request()
@@ -31,11 +29,7 @@ def test_pandas_opens_the_folder_also_while_a_collection_is_at_work(
     library: ExperienceLibrary,
 ) -> None:
     write_request(REQUEST, library.path / REQUEST_FILE)
-    with (
-        CollectionLock(library.path),
-        Journal(journal_path(library.shard_path("training-2"))) as journal,
-    ):
-        journal.append(RECORDS[2][0])
+    with library.locked():
         (library.path / ".training-2.parquet.tmp").write_bytes(b"half a shard")
         frame = pd.read_parquet(library.path)
     expected = RECORDS[0] + RECORDS[1]
@@ -48,7 +42,7 @@ def test_pandas_opens_the_folder_also_while_a_collection_is_at_work(
 def test_rows_columns_keys_and_scenario_are_what_was_written(library: ExperienceLibrary) -> None:
     expected = RECORDS[0] + RECORDS[1]
     assert comparable(library.records()) == comparable(expected)
-    assert library.keys() == {record.key for record in expected}
+    assert library.successes() == {record.key: record.success for record in expected}
     assert library.scenario() == SCENARIO
     columns = library.columns()
     assert columns["success"].dtype == bool
@@ -133,9 +127,9 @@ def test_libraries_of_two_scenarios_are_not_made_one(library: ExperienceLibrary)
 
 def test_a_library_that_is_not_there_or_empty_says_how_to_make_one(tmp_path: Path) -> None:
     with pytest.raises(LibraryError, match=r"no experience library at .*; make one with: lic"):
-        ExperienceLibrary(tmp_path / "none").keys()
+        ExperienceLibrary(tmp_path / "none").successes()
     empty = ExperienceLibrary(tmp_path)
-    assert (empty.keys(), empty.num_reaches) == (set(), 0)
+    assert (empty.successes(), empty.num_reaches) == ({}, 0)
     with pytest.raises(LibraryError, match="holds no reaches yet"):
         empty.columns()
 
@@ -179,3 +173,54 @@ def test_a_path_below_a_file_is_one_clear_error(library: ExperienceLibrary) -> N
     below = ExperienceLibrary(library.path / "training-1.parquet" / "library")
     with pytest.raises(LibraryError, match=r"cannot create the folder .*: Not a directory"):
         below.write_shard("training-2", RECORDS[2], SCENARIO)
+
+
+def test_merging_keeps_every_reach_once_in_order(
+    tmp_path: Path, library: ExperienceLibrary
+) -> None:
+    other, output = ExperienceLibrary(tmp_path / "other"), tmp_path / "new" / "all.parquet"
+    other.write_shard("a", RECORDS[2], SCENARIO)
+    other.write_shard("b", [replace(r, wall_time_s=-1.0) for r in RECORDS[1]], SCENARIO)
+    assert merge_libraries([other, library], output) == 36
+    merged = ExperienceLibrary(output)
+    assert comparable(merged.records()) == comparable(RECORDS[0] + RECORDS[1] + RECORDS[2])
+    assert merged.scenario() == SCENARIO
+    with pytest.raises(LibraryError, match=r"all\.parquet exists; delete it or choose another"):
+        merge_libraries([other], output)
+    with pytest.raises(LibraryError, match=r"needs the suffix \.parquet"):
+        merge_libraries([other], tmp_path / "all")
+
+
+def test_contradictions_and_different_scenarios_are_not_merged(
+    tmp_path: Path, library: ExperienceLibrary
+) -> None:
+    other = ExperienceLibrary(tmp_path / "other")
+    other.write_shard("a", [replace(RECORDS[1][4], duration_s=1.0)], SCENARIO)
+    with pytest.raises(LibraryError, match=f"another result of reach {RECORDS[1][4].key}"):
+        merge_libraries([library, other], tmp_path / "all.parquet")
+    scenario = load_scenario("cylinder-clutter", "{stop: {timeout_s: 20}}")
+    strange = ExperienceLibrary(tmp_path / "strange")
+    strange.write_shard("a", [replace(RECORDS[0][0], scenario=scenario.digest)], scenario)
+    with pytest.raises(LibraryError, match=f"strange holds scenario {scenario.digest}, but"):
+        merge_libraries([library, strange], tmp_path / "all.parquet")
+    assert not (tmp_path / "all.parquet").exists()
+
+
+def test_only_shares_of_one_division_have_the_lock_side_by_side(
+    library: ExperienceLibrary,
+) -> None:
+    with library.locked(Share(1, 2)), library.locked(Share(2, 2)):
+        for share in (Share(1, 2), Share(), Share(1, 3)):
+            with pytest.raises(LibraryError, match="another process is adding to"):
+                with library.locked(share):
+                    pass
+    with library.locked():
+        pass
+
+
+def test_a_share_is_every_nth_environment() -> None:
+    assert [list(Share(k, 3).of(range(5, 12))) for k in (1, 2, 3)] == [[5, 8, 11], [6, 9], [7, 10]]
+    assert Share.parse("2/3") == Share(2, 3)
+    for text in ("0/3", "4/3", "1", "a/b", "-1/3"):
+        with pytest.raises(RequestError, match="a share is k/n with k from 1 to n"):
+            Share.parse(text)

@@ -14,7 +14,7 @@ from pydrake.multibody.plant import MultibodyPlant
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.estimate.registry import make_estimator
-from lic_drake.experience.grid import CollectionRequest
+from lic_drake.experience.collect import CollectionRequest
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import load_scenario

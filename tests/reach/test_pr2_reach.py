@@ -8,7 +8,7 @@ from support.fake_reach import comparable
 from support.pr2_reaches import ARM, SCENARIO, pr2_of, spheres
 
 from lic_drake.errors import RequestError, ScenarioError
-from lic_drake.experience.grid import CollectionRequest
+from lic_drake.experience.collect import CollectionRequest
 from lic_drake.reach import rollout
 from lic_drake.reach.diagram import make_reach_diagram
 from lic_drake.reach.environment import Environment, simulate

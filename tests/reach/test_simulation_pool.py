@@ -6,7 +6,7 @@ from support.fake_reach import comparable
 from support.reaches import free_space, reach_request, small_clutter
 
 from lic_drake.clutter.instance import ClutterInstance
-from lic_drake.evaluate.batch import random_requests
+from lic_drake.evaluate.trial import random_requests
 from lic_drake.reach import rollout
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.rollout import run_reach

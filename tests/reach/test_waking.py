@@ -7,7 +7,7 @@ from support.reaches import MEASURED, free_space, reach_request, start_angles
 from support.worlds import box, cylinder, make_clutter
 
 from lic_drake.clutter.instance import ClutterInstance
-from lic_drake.evaluate.batch import random_requests
+from lic_drake.evaluate.trial import random_requests
 from lic_drake.reach import rollout
 from lic_drake.reach.environment import Environment
 from lic_drake.reach.rollout import run_reach

@@ -1,8 +1,6 @@
-from collections.abc import Callable
-from concurrent.futures import Future
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 from matplotlib.figure import Figure
@@ -10,31 +8,18 @@ from support.fake_reach import make_record
 
 from lic_drake.errors import LibraryError
 from lic_drake.evaluate import experiment
-from lic_drake.evaluate.batch import random_requests
 from lic_drake.evaluate.experiment import Evaluation
 from lic_drake.evaluate.statistics import Count, count
+from lic_drake.evaluate.trial import random_requests
 from lic_drake.evaluate.trials import TrialTable, read_trials
 from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.experience.workers import ThisProcess
 from lic_drake.paths import shipped_library
 from lic_drake.reach.request import ReachRecord, ReachRequest
+from scripts.real_experience import run as script
 from scripts.real_experience.run import REAL, Learned, draw_success, evaluate_learned, success_table
 
 WRONG_SIDE_Y = 0.1
-
-
-class HereExecutor:
-    """Does in this process, at once, what it is given."""
-
-    def __init__(self, *_: Any, initializer: Callable[..., None], initargs: Any, **__: Any) -> None:
-        initializer(*initargs)
-
-    def submit(self, function: Callable[..., Any], *args: Any) -> "Future[Any]":
-        future: Future[Any] = Future()
-        future.set_result(function(*args))
-        return future
-
-    def shutdown(self, cancel_futures: bool) -> None:
-        pass
 
 
 def reach(request: ReachRequest) -> ReachRecord:
@@ -49,8 +34,7 @@ def test_records_of_weight_turn_a_selection_that_the_simulation_had_wrong(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(experiment, "run_reach", reach)
-    monkeypatch.setattr(experiment, "ProcessPoolExecutor", HereExecutor)
-    monkeypatch.setattr(experiment, "prepare_worker", lambda: None)
+    monkeypatch.setattr(script, "LocalWorkers", lambda _: nullcontext(ThisProcess()))
     shipped = ExperienceLibrary(shipped_library("passage-clutter"))
     few = ExperienceLibrary(tmp_path / "simulated")
     few.write_shard("few", shipped.records()[:280], shipped.scenario())

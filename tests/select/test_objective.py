@@ -3,7 +3,7 @@ import pytest
 from support.select_surfaces import random_model
 
 from lic_drake.estimate.features import FeatureMap, features_of
-from lic_drake.experience.second_reach import SHOWN
+from lic_drake.experience.pairs import SHOWN
 from lic_drake.reach.start import Start, Starts
 from lic_drake.select.objective import Objective
 from lic_drake.select.situation import FailedReach

@@ -7,7 +7,7 @@ from support.pr2_reference import link_poses
 
 from lic_drake.errors import RequestError
 from lic_drake.estimate.features import FeatureMap
-from lic_drake.experience.second_reach import SHOWN
+from lic_drake.experience.pairs import SHOWN
 from lic_drake.reach.pointing_starts import PointingStarts, pointing_starts
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.start import Start, Starts

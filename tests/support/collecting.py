@@ -15,19 +15,16 @@ from typing import Any
 
 from support.fake_reach import FakeReach
 
-TESTS = Path(__file__).parent
+TESTS = Path(__file__).parents[1]
 OPTIONS = ("--environments", "3", "--max-goals", "4", "--max-starts", "3")
 """The options of `fake_reach.make_request()`."""
 
 SCRIPT = """
 import pickle, sys
 from functools import partial
-from support.fake_reach import limit_files
 from lic_drake.cli.main import main
 import lic_drake.experience.collect as module
-reach, fatal_bytes = pickle.loads(bytes.fromhex(sys.argv[1]))
-if fatal_bytes:
-    limit_files(fatal_bytes, fatal=True)
+reach = pickle.loads(bytes.fromhex(sys.argv[1]))
 module.collect = partial(module.collect, reach=reach)
 sys.exit(main(["collect", *sys.argv[2:]]))
 """
@@ -42,10 +39,8 @@ def collections() -> Iterator[Start]:
     # A killed process leaves its temporary files, and pytest's folders are too deep for a socket.
     with TemporaryDirectory() as folder:
 
-        def start(
-            library: Path, reach: FakeReach, *options: str, fatal_bytes: int = 0
-        ) -> "subprocess.Popen[str]":
-            message = pickle.dumps((reach, fatal_bytes)).hex()
+        def start(library: Path, reach: FakeReach, *options: str) -> "subprocess.Popen[str]":
+            message = pickle.dumps(reach).hex()
             process = subprocess.Popen(
                 [sys.executable, "-c", SCRIPT, message, str(library), *OPTIONS, *options],
                 env=environment(TMPDIR=folder),
@@ -66,7 +61,8 @@ def collections() -> Iterator[Start]:
 
 def environment(**values: str) -> dict[str, str]:
     """The environment of a process that can import the fakes."""
-    return {**os.environ, "PYTHONPATH": str(TESTS), **values}
+    path = os.pathsep.join([str(TESTS), os.environ.get("PYTHONPATH", "")])
+    return {**os.environ, "PYTHONPATH": path, **values}
 
 
 def check(library: Path) -> dict[str, Any]:

@@ -3,13 +3,22 @@
 import hashlib
 import math
 import os
-import resource
 import signal
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
-from lic_drake.experience.grid import REQUEST_FILE, CollectionRequest, write_request
+import pytest
+
+from lic_drake.experience import collect as collect_module
+from lic_drake.experience.collect import (
+    REQUEST_FILE,
+    CollectionRequest,
+    collect,
+    write_request,
+)
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.request import ReachRecord, ReachRequest, flat_starts
 from lic_drake.reach.scenario import load_scenario
@@ -31,6 +40,17 @@ def fill_library(path: Path) -> Path:
         library.write_shard(f"training-{environment:06d}", records, request.scenario)
     write_request(request, path / REQUEST_FILE)
     return path
+
+
+def collect_here(
+    monkeypatch: pytest.MonkeyPatch, reach: Callable[[ReachRequest], ReachRecord]
+) -> None:
+    """Lets `lic collect` use a fake reach in this process."""
+
+    def fake(library: Any, request: Any, workers: Any, **options: Any) -> Any:
+        return collect(library, request, reach=reach, **options)
+
+    monkeypatch.setattr(collect_module, "collect", fake)
 
 
 def make_record(request: ReachRequest) -> ReachRecord:
@@ -102,10 +122,6 @@ class FakeReach:
         deaths: ... this many times ...
         death: ... by this signal.
         failing_environment: Environment whose reaches raise.
-        max_file_bytes: Kernel limit for every file the process writes; 0: none.
-        limit_at: Key of the first request with this limit; the process's first one if empty.
-        fatal_limit: The write that exceeds the limit kills the whole process group: the bytes up
-            to the limit are in the file.
     """
 
     log: Path
@@ -115,15 +131,10 @@ class FakeReach:
     deaths: int = 1
     death: signal.Signals = signal.SIGKILL
     failing_environment: int = -1
-    max_file_bytes: int = 0
-    limit_at: str = ""
-    fatal_limit: bool = False
 
     def __call__(self, request: ReachRequest) -> ReachRecord:
         if request.environment == self.failing_environment:
             raise ArithmeticError("no such\nenvironment")
-        if self.max_file_bytes and self.limit_at in ("", request.key):
-            limit_files(self.max_file_bytes, fatal=self.fatal_limit)
         time.sleep(self.sleep_s)
         while self.hold.exists():
             time.sleep(0.02)
@@ -148,27 +159,15 @@ class FakeReach:
         return self.log.read_text().splitlines() if self.log.exists() else []
 
 
-@dataclass(frozen=True)
-class ThreadCountingReach:
-    """Notes in each record how many threads the linear algebra of the worker may use."""
+def count_threads(request: ReachRequest) -> ReachRecord:
+    """Notes in the record how many threads the linear algebra of the worker may use."""
+    import numpy as np
+    import scipy.linalg
+    from threadpoolctl import threadpool_info
 
-    def __call__(self, request: ReachRequest) -> ReachRecord:
-        import numpy as np
-        import scipy.linalg
-        from threadpoolctl import threadpool_info
-
-        scipy.linalg.solve(np.eye(2), np.ones(2))
-        threads = sorted({pool["num_threads"] for pool in threadpool_info()})
-        return replace(make_record(request), detail=str(threads))
-
-
-def limit_files(size: int, *, fatal: bool) -> None:
-    """Limits the files that this process writes; beyond, it gets EFBIG or its group dies."""
-    if fatal:
-        # The kernel takes the bytes up to the limit, then the write that follows sends SIGXFSZ.
-        signal.signal(signal.SIGXFSZ, lambda *_: os.killpg(0, signal.SIGKILL))
-    hard = resource.getrlimit(resource.RLIMIT_FSIZE)[1]
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    scipy.linalg.solve(np.eye(2), np.ones(2))
+    threads = sorted({pool["num_threads"] for pool in threadpool_info()})
+    return replace(make_record(request), detail=str(threads))
 
 
 def comparable(records: list[ReachRecord]) -> list[str]:

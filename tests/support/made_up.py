@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lic_drake.experience.grid import REQUEST_FILE, CollectionRequest, write_request
+from lic_drake.experience.collect import REQUEST_FILE, CollectionRequest, write_request
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.scenario import Scenario, load_scenario
 from support.fake_reach import make_record, make_request

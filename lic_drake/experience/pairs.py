@@ -1,0 +1,122 @@
+"""The library D2 of second reaches (paper III-C): from single reaches, or from real second ones."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lic_drake.errors import LibraryError
+
+SHOWN = (
+    "start_x",
+    "start_y",
+    "start_phi",
+    "final_x",
+    "final_y",
+    "final_phi",
+    "final_vx",
+    "final_vy",
+    "start_z",
+    "start_qx",
+    "final_z",
+    "final_vz",
+)
+"""Columns of a reach that a robot knows when it has failed: x0', x_inf' and the final velocity."""
+
+FIRST_PREFIX = "first_"
+"""What the names of these columns begin with where they belong to the first reach of a pair."""
+
+_SAME_TASK = ("stream", "environment", "goal_x", "goal_y", "goal_z")
+
+_IN_PLANE = ("start_x", "start_y", "start_phi", "base_x", "base_y")
+_IN_SPACE = (
+    *("start_x", "start_y", "start_z", "start_qw", "start_qx", "start_qy", "start_qz"),
+    *("base_x", "base_y", "torso"),
+)
+"""Numbers for each earlier reach in a record's `after`: its start pose and what carried the arm."""
+
+
+def pair_reaches(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Returns D2: each failed reach followed by each reach of its environment and goal.
+
+    The paper assumes that a reach leaves its environment as it was, so that a failed reach and any
+    reach to the same goal in the same environment are a first and a second attempt. It draws the
+    second reach "from all of the reach attempts, whether they resulted in failure or not" and uses
+    all pairs instead of drawing; so a reach also follows itself, and fails again. A reach that
+    never began (its final pose is NaN) showed nothing, and is the first of no pair.
+
+    Args:
+        columns: D1: arrays of equal length named as the fields of `ReachRecord`.
+
+    Returns:
+        The columns of the second reach, and of the first those of `SHOWN`, with `FIRST_PREFIX`
+        before their names. The pairs of a first reach stand together, in the order of D1.
+
+    Raises:
+        LibraryError: A column is missing.
+    """
+    missing = [name for name in (*_SAME_TASK, *SHOWN, "success") if name not in columns]
+    if missing:
+        raise LibraryError(f"the library has no column {missing[0]!r}, which D2 is made from")
+    task = _task_of_each(columns)
+    members = np.argsort(task, kind="stable")
+    num_members = np.bincount(task)
+    offset = np.cumsum(num_members) - num_members
+
+    known = np.isfinite(np.column_stack([columns[name].astype(float) for name in SHOWN]))
+    failed = np.flatnonzero(~columns["success"].astype(bool) & known.all(axis=1))
+    repeats = num_members[task[failed]]
+    first = np.repeat(failed, repeats)
+    rank = np.arange(len(first)) - np.repeat(np.cumsum(repeats) - repeats, repeats)
+    second = members[offset[task[first]] + rank]
+    return _joined(columns, first, second)
+
+
+def pair_second_attempts(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Returns D2 from second attempts that were made: the paper's "straightforward approach".
+
+    Args:
+        columns: Columns of a library that holds second attempts, whose `after` has one reach, and
+            the first attempts that they came after.
+
+    Returns:
+        As `pair_reaches`, in the library's order.
+
+    Raises:
+        LibraryError: There is no second attempt, or one without the first attempt before it.
+    """
+    lengths = np.array([len(after) for after in columns["after"]], dtype=int)
+    in_space = np.any(columns.get("start_qw", np.zeros(1)) != 0.0)
+    start = _IN_SPACE if in_space else _IN_PLANE
+    first_of = {
+        (*(columns[n][i] for n in _SAME_TASK), *(float(columns[n][i]) for n in start)): i
+        for i in np.flatnonzero(lengths == 0)
+    }
+    second = np.flatnonzero(lengths == len(start))
+    if len(second) == 0:
+        raise LibraryError("the library holds no second attempts; give one that does")
+    try:
+        first = [
+            first_of[(*(columns[n][i] for n in _SAME_TASK), *map(float, columns["after"][i]))]
+            for i in second
+        ]
+    except KeyError:
+        raise LibraryError(
+            "the library lacks the first attempt of a second one; collect both into one library"
+        ) from None
+    return _joined(columns, np.array(first), second)
+
+
+def _joined(
+    columns: Mapping[str, NDArray[Any]], first: NDArray[np.intp], second: NDArray[np.intp]
+) -> dict[str, NDArray[Any]]:
+    pairs = {name: values[second] for name, values in columns.items()}
+    return pairs | {FIRST_PREFIX + name: columns[name][first] for name in SHOWN}
+
+
+def _task_of_each(columns: Mapping[str, NDArray[Any]]) -> NDArray[np.intp]:
+    """Returns a number for each row that rows of the same environment and goal share."""
+    codes = [np.unique(columns[name], return_inverse=True)[1] for name in _SAME_TASK]
+    _, task = np.unique(np.column_stack(codes), axis=0, return_inverse=True)
+    return task.ravel()

@@ -1,0 +1,177 @@
+"""The runner in this process: what is simulated, what is not, and what stops it."""
+
+import errno
+import os
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.fake_reach import FakeReach, comparable, expected_records, make_record, make_request
+
+from lic_drake.errors import ClusterError, LibraryError
+from lic_drake.experience.collect import REQUEST_FILE, collect, read_request
+from lic_drake.experience.runner import Progress, simulate
+from lic_drake.experience.store import ExperienceLibrary, Share, merge_libraries
+from lic_drake.reach.request import ReachRecord, ReachRequest
+from lic_drake.reach.scenario import load_scenario
+
+REQUEST = make_request()
+SHARDS = [f"training-{e:06d}.parquet" for e in range(3)]
+
+
+@pytest.fixture
+def library(tmp_path: Path) -> ExperienceLibrary:
+    return ExperienceLibrary(tmp_path / "library")
+
+
+@pytest.fixture
+def reach(tmp_path: Path) -> FakeReach:
+    return FakeReach(log=tmp_path / "calls")
+
+
+def names(library: ExperienceLibrary) -> list[str]:
+    return sorted(path.name for path in library.path.iterdir() if path.suffix != ".lock")
+
+
+def test_a_collection_fills_the_library_and_a_second_run_simulates_nothing(
+    library: ExperienceLibrary, reach: FakeReach
+) -> None:
+    seen: list[Progress] = []
+    report = collect(library, REQUEST, reach=reach, progress=seen.append)
+    assert comparable(library.records()) == expected_records(REQUEST)
+    assert names(library) == [REQUEST_FILE, *SHARDS]
+    assert read_request(library.path / REQUEST_FILE) == REQUEST
+    assert (report.failed, report.progress.present, report.progress.done) == ((), 0, 36)
+    assert report.progress.successes == sum(record.success for record in library.records())
+    assert [progress.done for progress in seen] == [12, 24, 36]
+    assert seen[-1].time_left_s == 0.0
+
+    again = collect(library, REQUEST, reach=reach).progress
+    assert len(reach.calls()) == 36
+    assert (again.present, again.done, again.successes) == (36, 36, report.progress.successes)
+
+
+def test_more_environments_add_to_the_library(library: ExperienceLibrary, reach: FakeReach) -> None:
+    larger = replace(REQUEST, environments=5)
+    collect(library, REQUEST, reach=reach)
+    collect(library, larger, reach=reach)
+    assert comparable(library.records()) == expected_records(larger)
+    assert len(reach.calls()) == 5 * 12
+    assert read_request(library.path / REQUEST_FILE) == larger
+
+
+def test_more_requests_into_an_environment_are_added_to_its_shard(
+    library: ExperienceLibrary, reach: FakeReach
+) -> None:
+    requests = REQUEST.reaches(1)
+    simulate(requests[:5], library, reach=reach)
+    simulate([*requests[3:], requests[0]], library, reach=reach)
+    assert comparable(library.records()) == comparable([make_record(r) for r in requests])
+    assert names(library) == SHARDS[1:2]
+    assert len(reach.calls()) == len(requests)
+
+
+def test_another_request_is_refused_before_anything_is_simulated(
+    library: ExperienceLibrary, reach: FakeReach
+) -> None:
+    collect(library, REQUEST, reach=reach)
+    other = load_scenario("cylinder-clutter", "{stop: {timeout_s: 20}}")
+    for change, message in (
+        ({"environments": 2}, "3 environments, not 2"),
+        ({"max_goals": 5}, "was begun with max_goals 4 instead of 5"),
+        ({"scenario": other}, "scenario_digest"),
+    ):
+        with pytest.raises(LibraryError, match=message):
+            collect(library, replace(REQUEST, **change), reach=reach)
+    (library.path / REQUEST_FILE).unlink()
+    with pytest.raises(LibraryError, match="holds reaches of scenario"):
+        collect(library, replace(REQUEST, scenario=other), reach=reach)
+    assert names(library) == SHARDS
+    assert len(reach.calls()) == 36
+
+
+def test_shares_divide_the_environments_and_any_collection_completes_them(
+    library: ExperienceLibrary, reach: FakeReach
+) -> None:
+    larger = replace(REQUEST, environments=5)
+    report = collect(library, larger, share=Share(2, 3), reach=reach)
+    assert (report.progress.total, report.progress.done) == (24, 24)
+    assert names(library) == [REQUEST_FILE, "training-000001.parquet", "training-000004.parquet"]
+    assert collect(library, larger, share=Share(7, 7), reach=reach).progress.total == 0
+    rest = collect(library, larger, reach=reach)
+    assert (rest.progress.total, rest.progress.present) == (60, 24)
+    assert comparable(library.records()) == expected_records(larger)
+    assert len(reach.calls()) == 60
+
+
+def test_reaches_that_came_from_elsewhere_are_not_simulated_again(
+    tmp_path: Path, library: ExperienceLibrary, reach: FakeReach
+) -> None:
+    collect(library, REQUEST, reach=reach)
+    other = ExperienceLibrary(tmp_path / "other")
+    other.create()
+    merge_libraries([library], other.path / "all.parquet")
+    collect(other, replace(REQUEST, environments=4), reach=reach)
+    assert len(reach.calls()) == 4 * 12
+    assert names(other) == [REQUEST_FILE, "all.parquet", "training-000003.parquet"]
+
+
+def test_an_environment_that_raises_is_reported_and_the_rest_goes_on(
+    library: ExperienceLibrary, reach: FakeReach
+) -> None:
+    report = collect(library, REQUEST, reach=replace(reach, failing_environment=1))
+    assert [(f.name, f.reason) for f in report.failed] == [
+        ("training-000001", "ArithmeticError: no such environment")
+    ]
+    assert report.progress.done == 24
+    assert {record.environment for record in library.records()} == {0, 2}
+
+
+@pytest.mark.parametrize("change", [{"key": "0" * 16}, {"lic_drake_version": "0.0.1"}])
+def test_the_records_of_a_worker_with_another_lic_drake_are_refused(
+    library: ExperienceLibrary, change: dict[str, str]
+) -> None:
+    def strange(request: ReachRequest) -> ReachRecord:
+        return replace(make_record(request), **change)
+
+    with pytest.raises(ClusterError, match="simulated other reaches than those of training-000000"):
+        collect(library, REQUEST, reach=strange)
+    assert library.successes() == {}
+
+
+def test_a_full_disk_is_one_line_and_loses_no_finished_environment(
+    library: ExperienceLibrary, reach: FakeReach, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from lic_drake.experience import store
+
+    def refuse_the_second(table: Any, path: Path) -> None:
+        if "000001" in path.name:
+            path.write_bytes(b"half a shard")
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        write_table(table, path)
+
+    write_table = store.write_table
+    monkeypatch.setattr(store, "write_table", refuse_the_second)
+    with pytest.raises(LibraryError, match=r"000001\.parquet: No space left .* are kept") as error:
+        collect(library, REQUEST, reach=reach)
+    assert "\n" not in str(error.value)
+    assert names(library) == [REQUEST_FILE, SHARDS[0]]
+    monkeypatch.undo()
+    assert collect(library, REQUEST, reach=reach).progress.present == 12
+    assert comparable(library.records()) == expected_records(REQUEST)
+    assert len(reach.calls()) == 36 + 12
+
+
+def test_a_truncated_shard_is_named_and_its_reaches_come_back_after_its_deletion(
+    library: ExperienceLibrary, reach: FakeReach
+) -> None:
+    collect(library, REQUEST, reach=reach)
+    shard = library.shard_path("training-000001")
+    shard.write_bytes(shard.read_bytes()[:-50])
+    with pytest.raises(LibraryError, match=r"training-000001\.parquet is damaged .*, delete it"):
+        collect(library, REQUEST, reach=reach)
+    shard.unlink()
+    collect(library, REQUEST, reach=reach)
+    assert comparable(library.records()) == expected_records(REQUEST)
+    assert len(reach.calls()) == 36 + 12
