@@ -16,7 +16,7 @@ from lic_drake.estimate.nearest_neighbours import NearestNeighbours
 from lic_drake.estimate.registry import register_estimator
 from lic_drake.paths import models_dir
 from lic_drake.registry import Registry, load_extensions
-from lic_drake.robots.planar import PlanarArm, planar_arm
+from lic_drake.robots.planar import make_planar_arm, planar_arm
 from lic_drake.robots.registry import get_robot, register_robot
 
 
@@ -53,7 +53,7 @@ def test_nobody_takes_anothers_name() -> None:
     with pytest.raises(ScenarioError, match="cylinder-clutter"):
         register_category("cylinder-clutter", make_category())
     with pytest.raises(ScenarioError, match="planar-arm"):
-        register_robot("planar-arm", PlanarArm)
+        register_robot("planar-arm", lambda: planar_arm())
     with pytest.raises(EstimateError, match="gp"):
         register_estimator("gp", lambda features: NearestNeighbours())
     assert get_robot("planar-arm") is planar_arm()
@@ -116,10 +116,10 @@ def described(*changes: tuple[str, str]) -> str:
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ([('<axis xyz="0 0 1"/>', '<axis xyz="0 0 -1"/>')], "joints about"),
-        ([('<origin xyz="0 -0.334 0"/>', '<origin xyz="0.334 0 0"/>')], "links along"),
+        ([('<axis xyz="0 0 1"/>', '<axis xyz="0 0 -1"/>')], "closed form"),
+        ([('<origin xyz="0 -0.334 0"/>', '<origin xyz="0.334 0 0"/>')], "closed form"),
         ([('name="tip"', 'name="hand"')], "tip"),
-        ([('type="revolute"', 'type="fixed"')], "degrees of freedom"),
+        ([('type="revolute"', 'type="fixed"')], "0 revolute joints"),
         ([('lower="-2.61799387799" upper="2.61799387799" ', "")], "limits"),
         ([("drake:controller_gains", "drake:other")], "gains"),
         ([('<link name="link2">', '<link name="forearm">')], "link2"),
@@ -130,8 +130,8 @@ def described(*changes: tuple[str, str]) -> str:
 def test_a_description_of_another_kind_of_arm_is_refused(
     changes: list[tuple[str, str]], said: str
 ) -> None:
-    with pytest.raises(ScenarioError, match=rf"description of mine(?s:.)*{said}") as caught:
-        PlanarArm(described(*changes), name="mine")
+    with pytest.raises(ScenarioError, match=rf"model of mine(?s:.)*{said}") as caught:
+        make_planar_arm("mine", described(*changes))
     assert "\n" not in str(caught.value)
 
 

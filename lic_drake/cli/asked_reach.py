@@ -20,7 +20,7 @@ def asked_reach(scenario: Scenario, args: argparse.Namespace) -> ReachRequest:
         RequestError: Goal or start are not possible, or are those of another kind of robot.
     """
     instance = scenario.sample_instance(args.stream, args.environment)
-    in_space = scenario.arm().surface is not None
+    in_space = not scenario.arm().is_planar
     p_WG = _goal(scenario, in_space, args)
     foreign = ("start_y", "start_phi") if in_space else ("aperture", "base_y", "torso")
     for name in foreign:
@@ -62,12 +62,12 @@ def _through_an_aperture(
     y_m = 0.0 if args.base_y is None else args.base_y
     torso_m = scenario.task.torso_m if args.torso is None else args.torso
     _check_stand(starts, y_m, torso_m)
-    check_goal(scenario, p_WG - [0.0, y_m, 0.0], torso_m)
     if args.aperture is None:
         p_WA = starts.p_WA[np.argmin(np.linalg.norm(starts.p_WA[:, 1:] - p_WG[1:], axis=1))]
     else:
         p_WA = starts.nearest_aperture(*args.aperture)
     b0 = np.array([0.0, y_m, torso_m])
+    check_goal(scenario, p_WG - b0)
     found = starts.pre_select(p_WA, b0)
     if found is None:
         raise RequestError(

@@ -79,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
     starts = make_starts(scenario, instance)
     stands = np.unique(starts.grid.b0, axis=0)
     nearest = stands[np.argmin(np.linalg.norm((stands - p_WG)[:, 1:], axis=1))]
-    check_goal(scenario, p_WG - [*nearest[:2], 0.0], nearest[2])
+    check_goal(scenario, p_WG - nearest)
     failed = tuple(_failed_start(scenario, starts, *numbers) for numbers in args.failed)
     situation = Situation(p_WG=p_WG, starts=starts, failed=failed)
     rng = np.random.default_rng(args.seed)

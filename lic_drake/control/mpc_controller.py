@@ -6,7 +6,6 @@ from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 from lic_drake.control.mpc import HapticMpc, MpcInput
 from lic_drake.control.mpc_config import MpcConfig
 from lic_drake.control.taxels import TaxelLayout
-from lic_drake.control.torso import RaisableArm
 from lic_drake.robots.arm import Arm
 from lic_drake.types import Vector
 
@@ -20,16 +19,14 @@ class HapticMpcController(LeafSystem):
         goal: p_RG, size 3, metres.
     Output port:
         desired_state: [q_d, 0], size 2 m, rad and rad/s, held between control steps.
-    Parameter:
-        Height of the torso that carries the arm, metres; see `arm`.
     """
 
     def __init__(self, arm: Arm, layout: TaxelLayout, config: MpcConfig) -> None:
         super().__init__()
-        self.arm = RaisableArm(self, arm)
+        self._arm = arm
         self._layout = layout
         self._mpc = HapticMpc(config, arm.stiffness, arm.q_min, arm.q_max)
-        self._num_joints = len(arm.q_min)
+        self._num_joints = arm.num_joints
         self._arm_state = self.DeclareVectorInputPort("arm_state", 2 * self._num_joints)
         self._taxel_force = self.DeclareVectorInputPort("taxel_force", layout.num_taxels)
         self._goal = self.DeclareVectorInputPort("goal", 3)
@@ -52,18 +49,17 @@ class HapticMpcController(LeafSystem):
 
         loaded = np.flatnonzero(taxel_force > self._mpc.config.force_trim_N)
         links = self._layout.link[loaded]
-        arm = self.arm.at(context)
-        R_RL, p_RL = arm.link_poses(q)
-        turn = R_RL[links]
-        p_RC = p_RL[links] + np.vecdot(turn, self._layout.p_LT[loaded, None])
+        pose = self._arm.calc_pose(q)
+        turn = pose.R_RL[links]
+        p_RC = pose.p_RL[links] + np.vecdot(turn, self._layout.p_LT[loaded, None])
         state = MpcInput(
             q=q,
             q_d=q_d,
-            p_EG=p_RG - arm.tip_position(q),
-            Jv_E=arm.tip_jacobian(q),
+            p_EG=p_RG - pose.p_RE,
+            Jv_E=pose.Jv_E,
             normals=np.vecdot(turn, self._layout.n_L[loaded, None]),
             forces=taxel_force[loaded],
-            Jv_C=arm.point_jacobians(q, links, p_RC),
+            Jv_C=self._arm.point_jacobians(pose, links, p_RC),
         )
         desired = np.zeros(2 * m)
         desired[:m] = q_d + self._mpc.step(state)

@@ -1,11 +1,11 @@
-"""Taxels on the faces of boxes and cylinders: the skin of an arm in space."""
+"""Taxels on the surfaces of boxes, cylinders and capsules: the skin of an arm in space."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lic_drake.control.taxels import TaxelLayout, planar_taxels
 from lic_drake.robots.arm import Arm
-from lic_drake.robots.skin_shape import SkinShape
+from lic_drake.robots.skin import SkinShape
 from lic_drake.types import Vector
 
 INSIDE_M = 1e-6
@@ -19,9 +19,9 @@ def make_taxels(arm: Arm, per_metre: float) -> TaxelLayout:
         arm: The arm.
         per_metre: Density of the rows, 1/m (paper V-A: 100 in the plane).
     """
-    if arm.surface is None:
+    if arm.is_planar:
         return planar_taxels(arm.skin, per_metre)
-    return surface_taxels(arm.surface, arm.link_names, per_metre)
+    return surface_taxels(arm.skin, arm.link_names, per_metre)
 
 
 def surface_taxels(
@@ -39,7 +39,7 @@ def surface_taxels(
     """
     links, positions, normals = [], [], []
     for shape in surface:
-        p_ST, n_S = _box(shape, per_metre) if shape.kind == "box" else _cylinder(shape, per_metre)
+        p_ST, n_S = _LATTICE[shape.kind](shape, per_metre)
         p_LT = shape.p_LS + p_ST @ shape.R_LS.T
         free = np.ones(len(p_LT), dtype=bool)
         for other in surface:
@@ -62,6 +62,10 @@ def is_inside(shape: SkinShape, p_LQ: Vector) -> NDArray[np.bool_]:
     if shape.kind == "box":
         return np.all(p_SQ < 0.5 * np.array(shape.size) - INSIDE_M, axis=1)
     radius, length = shape.size
+    if shape.kind == "capsule":
+        p_SQ[:, 2] = np.maximum(p_SQ[:, 2] - 0.5 * length, 0.0)
+        near: NDArray[np.bool_] = np.linalg.norm(p_SQ, axis=1) < radius - INSIDE_M
+        return near
     inside: NDArray[np.bool_] = np.hypot(p_SQ[:, 0], p_SQ[:, 1]) < radius - INSIDE_M
     return inside & (p_SQ[:, 2] < 0.5 * length - INSIDE_M)
 
@@ -104,6 +108,23 @@ def _cylinder(shape: SkinShape, per_metre: float) -> tuple[Vector, Vector]:
     return np.vstack(positions), np.vstack(normals)
 
 
+def _capsule(shape: SkinShape, per_metre: float) -> tuple[Vector, Vector]:
+    """Returns positions and normals on barrel and half spheres, in the shape's frame."""
+    radius, length = shape.size
+    n_S = [(c, s, 0.0) for _ in _rows(length, per_metre) for c, s in _ring(radius, per_metre)]
+    z = [z for z in _rows(length, per_metre) for _ in _ring(radius, per_metre)]
+    # Rings at the middles of equally high strips of the half spheres.
+    strips = max(1, round(0.5 * np.pi * radius * per_metre))
+    for up in (np.arange(strips) + 0.5) / strips:
+        across = np.sqrt(1.0 - up**2)
+        for sign in (1.0, -1.0):
+            ring = _ring(radius * across, per_metre)
+            n_S += [(across * c, across * s, sign * up) for c, s in ring]
+            z += [sign * 0.5 * length] * len(ring)
+    normals = np.array(n_S)
+    return radius * normals + np.outer(z, [0.0, 0.0, 1.0]), normals
+
+
 def _rows(length: float, per_metre: float) -> Vector:
     """Returns the places of rows over a length about 0, shape (n,), metres."""
     count = max(1, round(length * per_metre))
@@ -116,3 +137,6 @@ def _ring(radius: float, per_metre: float) -> Vector:
         2.0 * np.pi * np.arange(count := max(3, round(2.0 * np.pi * radius * per_metre))) / count
     )
     return np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+_LATTICE = {"box": _box, "cylinder": _cylinder, "capsule": _capsule}

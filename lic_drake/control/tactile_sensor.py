@@ -11,7 +11,6 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from lic_drake.control.tactile import ContactPatch, calc_taxel_forces
 from lic_drake.control.taxels import TaxelLayout
-from lic_drake.control.torso import RaisableArm
 from lic_drake.robots.arm import Arm
 
 BODY = -1
@@ -30,9 +29,6 @@ class TactileSensor(LeafSystem):
     Output port:
         taxel_force: Normal force on each taxel, size num_taxels, N, compression positive.
 
-    Parameter:
-        Height of the torso that carries the arm, metres; see `arm`.
-
     Args:
         arm: The arm.
         layout: Its taxels.
@@ -49,8 +45,8 @@ class TactileSensor(LeafSystem):
         body: Iterable[GeometryId] = (),
     ) -> None:
         super().__init__()
-        self.arm = RaisableArm(self, arm)
-        self._num_joints = len(arm.q_min)
+        self._arm = arm
+        self._num_joints = arm.num_joints
         self._layout = layout
         # Numbers: a GeometryId that a plant has returned keeps the whole diagram alive for ever.
         self._skin_links = {geometry.get_value(): link for geometry, link in skin_links.items()}
@@ -67,7 +63,6 @@ class TactileSensor(LeafSystem):
             prerequisites_of_calc={
                 self.input_port_ticket(self._contact_results.get_index()),
                 self.input_port_ticket(self._arm_state.get_index()),
-                self.all_parameters_ticket(),
             },
         )
 
@@ -78,8 +73,8 @@ class TactileSensor(LeafSystem):
             output.SetFromVector(np.zeros(self._layout.num_taxels))
             return
         q = np.asarray(self._arm_state.Eval(context))[: self._num_joints]
-        link_poses = self.arm.at(context).link_poses(q)
-        output.SetFromVector(calc_taxel_forces(self._layout, *link_poses, patches))
+        pose = self._arm.calc_pose(q)
+        output.SetFromVector(calc_taxel_forces(self._layout, pose.R_RL, pose.p_RL, patches))
 
     def _eval_contacts(self, context: Context) -> ContactResults:
         """Lets the plant find and solve the contacts of this instant."""

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lic_drake.robots.arm import SkinCapsule
+from lic_drake.robots.skin import SkinShape
 from lic_drake.types import Vector
 
 CAP_ANGLES_DEG = (-72.0, -36.0, 0.0, 36.0, 72.0)
@@ -73,7 +73,7 @@ class TaxelLayout:
         return tuple(links)
 
 
-def planar_taxels(skin: tuple[SkinCapsule, ...], per_metre: float = 100.0) -> TaxelLayout:
+def planar_taxels(skin: tuple[SkinShape, ...], per_metre: float = 100.0) -> TaxelLayout:
     """Returns taxels around each capsule in the plane of motion (z = 0).
 
     Rows on both long sides, symmetric about the link's centre, and five taxels on each end cap,
@@ -85,18 +85,19 @@ def planar_taxels(skin: tuple[SkinCapsule, ...], per_metre: float = 100.0) -> Ta
     """
     links, positions, normals = [], [], []
     for index, capsule in enumerate(skin):
-        along = capsule.R_LC[:, 2]
+        radius, length = capsule.size
+        along = capsule.R_LS[:, 2]
         side = np.cross([0.0, 0.0, 1.0], along)
-        count = int(np.floor(capsule.length * per_metre + 1e-9))
+        count = int(np.floor(length * per_metre + 1e-9))
         offsets = (np.arange(count) - 0.5 * (count - 1)) / per_metre
         rows = [(offset * along, sign * side) for sign in (1.0, -1.0) for offset in offsets]
         cap = np.deg2rad(CAP_ANGLES_DEG)
         for end in (1.0, -1.0):
-            centre = end * 0.5 * capsule.length * along
+            centre = end * 0.5 * length * along
             rows += [(centre, np.cos(a) * end * along + np.sin(a) * side) for a in cap]
         for centre, normal in rows:
             links.append(index)
-            positions.append(capsule.p_LC + centre + capsule.radius * normal)
+            positions.append(capsule.p_LS + centre + radius * normal)
             normals.append(normal)
     return TaxelLayout(
         pitch_m=1.0 / per_metre,

@@ -137,7 +137,7 @@ def columns_of(scenario: Scenario) -> dict[str, float | None]:
         "environment": math.nan,
         **dict.fromkeys(_FINAL, math.nan),
     }
-    if scenario.arm().surface is None:
+    if scenario.arm().is_planar:
         needed |= dict.fromkeys(("start_y", "start_phi"))
         optional |= {"start_x": scenario.task.start_line.x_m, "final_phi": math.nan, "base_y": 0.0}
         if scenario.task.base is not None:
@@ -176,7 +176,7 @@ def check_rows(
             f"{origin} has no column {missing[0]!r}; rows of {scenario.category} need"
             f" {', '.join(needed)}"
         )
-    in_plane = scenario.arm().surface is None
+    in_plane = scenario.arm().is_planar
     unseen = _UNSEEN | ({"goal_z": 0.0} if in_plane else {"start_phi": 0.0, "final_phi": 0.0})
     if not in_plane:
         unseen |= {f"final_q{axis}": math.nan for axis in "wxyz"}
@@ -232,10 +232,10 @@ def _check(row: Mapping[str, float], scenario: Scenario, where: str) -> None:
                 f"{where}: {name} is {row[name]:g} rad, which must be from -3.1416 to 3.1416;"
                 " directions are in radians, not degrees"
             )
-    p_WR = np.array([row["base_x"], row["base_y"], 0.0])
+    b0 = np.array([row["base_x"], row["base_y"], row.get("torso", 0.0)])
     p_WG = np.array([row["goal_x"], row["goal_y"], row.get("goal_z", 0.0)])
     try:
-        check_goal(scenario, p_WG - p_WR, row.get("torso"))
+        check_goal(scenario, p_WG - b0)
     except RequestError as error:
         raise LibraryError(f"{where}: {error}, or leave the row out") from None
     if "torso" in row:

@@ -36,7 +36,7 @@ from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import RenderingError
 from lic_drake.perception.config import CameraConfig, CamerasConfig
 from lic_drake.perception.image import CameraImage, Views
-from lic_drake.robots.pr2_head import HEAD_CAMERA, RIGHT_ARM_AT_REST, LookingPr2
+from lic_drake.robots.pr2 import HEAD_CAMERA, RIGHT_ARM_AT_REST, make_pr2
 from lic_drake.scene.scene import Scene, SceneConfig, add_scene
 from lic_drake.types import Vector
 
@@ -81,20 +81,23 @@ class CameraRig(NamedTuple):
     """A scene with a PR2 that looks, and its cameras, in a diagram.
 
     Attributes:
-        scene: Robot and environment.
+        scene: Mobile robot and environment.
+        b0: Where the robot looks from, shape (3,), metres.
         head: The sensor on the robot's head.
         external: The sensor that sees the goal.
     """
 
     scene: Scene
+    b0: Vector
     head: RgbdSensor
     external: RgbdSensor
 
     def set_looking_posture(self, root: Context) -> None:
-        """Puts the robot's right arm beside its body, in a context of the diagram."""
+        """Puts the robot where it looks from, its right arm beside its body, in a root context."""
         plant = self.scene.plant
         context = plant.GetMyMutableContextFromRoot(root)
-        plant.SetPositions(context, self.scene.arm, RIGHT_ARM_AT_REST)
+        positions = self.scene.robot.positions(self.b0, RIGHT_ARM_AT_REST)
+        plant.SetPositions(context, self.scene.arm, positions)
 
 
 def add_cameras(
@@ -102,7 +105,7 @@ def add_cameras(
     instance: ClutterInstance,
     p_WG: Vector,
     cameras: CamerasConfig,
-    placeable: bool = False,
+    ahead: bool = False,
 ) -> CameraRig:
     """Adds an environment, a ball at the goal, the robot where it looks from, and the cameras.
 
@@ -111,17 +114,16 @@ def add_cameras(
         instance: The environment.
         p_WG: The goal, shape (3,), metres.
         cameras: The cameras.
-        placeable: Whether the robot can be placed, see `lic_drake.scene.furnish.place_robot`; it
-            then faces along x.
+        ahead: Whether the robot faces along x instead of where it looks.
 
     Raises:
         RenderingError: The renderer does not work on this machine.
     """
     head, external = cameras.head, cameras.external
-    base_pose = (0.0, 0.0, 0.0) if placeable else head.base_pose
-    robot = LookingPr2(base_pose, head.torso_m, head.tilt_deg)
-    config = SceneConfig()
-    scene = add_scene(builder, robot, instance, config, visuals=True, placeable=placeable)
+    x, y, heading = head.base_pose
+    robot = make_pr2(0.0 if ahead else heading, head.tilt_deg)
+    robot.check_height(head.torso_m)
+    scene = add_scene(builder, robot, instance, SceneConfig(), visuals=True, mobile=True)
     plant, scene_graph = scene.plant, scene.scene_graph
     scene_graph.AddRenderer(RENDERER, make_renderer())
     add_prop(scene_graph, "ball", Sphere(cameras.ball_radius_m), p_WG, BALL_COLOR)
@@ -131,6 +133,7 @@ def add_cameras(
     X_WC = look_at(external.p_WC, external.target)
     return CameraRig(
         scene=scene,
+        b0=np.array([x, y, head.torso_m]),
         head=add_camera(
             builder, scene_graph, "head", head.camera, mount.GetFixedPoseInBodyFrame(), parent
         ),

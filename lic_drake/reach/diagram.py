@@ -10,7 +10,6 @@ from lic_drake.control.mpc_controller import HapticMpcController
 from lic_drake.control.surface_taxels import make_taxels
 from lic_drake.control.tactile_sensor import TactileSensor
 from lic_drake.reach.scenario import Scenario
-from lic_drake.scene.furnish import raise_torso
 from lic_drake.scene.scene import Scene, add_scene
 from lic_drake.types import Vector
 
@@ -19,55 +18,49 @@ from lic_drake.types import Vector
 class ReachDiagram:
     """A built diagram and what a rollout needs of it.
 
-    The diagram's input port is `goal` (p_WG, 3); its output ports are `arm_state` ([q, v]),
-    `clutter_state` ([p, v] of the movable objects), `taxel_force` and `desired_state`. The height
-    of the torso is a parameter.
+    Its world is the robot's frame R. Its input port is `goal` (p_RG, 3); its output ports are
+    `arm_state` ([q, v]), `clutter_state` ([p, v] of the movable objects), `taxel_force` and
+    `desired_state`.
     """
 
     diagram: Diagram
     scene: Scene
     sensor: TactileSensor
     controller: HapticMpcController
-    torso_frame: str
 
-    def set_start(self, context: Context, q: Vector, p_WG: Vector) -> None:
-        """Puts the arm at rest at q, with the goal p_WG, in a context of the diagram."""
+    def set_start(self, context: Context, q: Vector, p_RG: Vector) -> None:
+        """Puts the arm at rest at q, with the goal p_RG, in a context of the diagram."""
         plant = self.scene.plant
         x = np.append(q, np.zeros(len(q)))
         plant.SetPositionsAndVelocities(
             plant.GetMyMutableContextFromRoot(context), self.scene.arm, x
         )
         self.controller.set_equilibrium(self.controller.GetMyMutableContextFromRoot(context), q)
-        self.diagram.GetInputPort("goal").FixValue(context, p_WG)
-
-    def set_torso(self, context: Context, torso_m: float) -> None:
-        """Puts the torso that carries the arm at a height, metres, in a context of the diagram."""
-        if self.torso_frame:
-            raise_torso(self.scene, context, self.torso_frame, torso_m)
-        for system in (self.sensor, self.controller):
-            system.arm.raise_to(system.GetMyMutableContextFromRoot(context), torso_m)
+        self.diagram.GetInputPort("goal").FixValue(context, p_RG)
 
 
 def make_reach_diagram(
     scenario: Scenario,
     instance: ClutterInstance,
-    torso_m: float | None = None,
+    height_m: float | None = None,
 ) -> ReachDiagram:
     """Builds the diagram of one environment.
 
     Args:
         scenario: Robot, contact, controller.
-        instance: The clutter.
-        torso_m: Height of the robot's torso, metres; by default as the scenario's task has it.
+        instance: The clutter, in R.
+        height_m: How far R is above the robot's floor, metres; by default as the task has it. It
+            only moves the robot's body.
     """
     builder = DiagramBuilder()
-    arm = scenario.arm(torso_m)
+    arm = scenario.arm()
     layout = make_taxels(arm, scenario.scene.taxels_per_m)
     scene = add_scene(
         builder,
         arm,
         instance,
         scenario.scene,
+        height_m=scenario.task.torso_m if height_m is None else height_m,
     )
     plant = scene.plant
     plant.set_name("plant")
@@ -98,5 +91,4 @@ def make_reach_diagram(
         scene=scene,
         sensor=sensor,
         controller=controller,
-        torso_frame=arm.torso_frame,
     )

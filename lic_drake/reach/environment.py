@@ -11,6 +11,7 @@ from lic_drake.reach.request import is_within_reach
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.simulation import Simulation
 from lic_drake.reach.simulation_pool import SimulationPool
+from lic_drake.reach.start import Start
 from lic_drake.reach.stem_waking import StemWakingSimulation
 from lic_drake.reach.stop_rules import StopMonitor
 from lic_drake.reach.trace import ReachResult, ReachTrace
@@ -28,12 +29,12 @@ class Environment:
         instance: The clutter.
         sleep: Whether objects may sleep until the arm comes near; without, a reach costs three
             times as much and ends the same.
-        p_WR: Where the mobile base stands, shape (3,), metres; by default at the origin.
-        torso_m: Height of the robot's torso, metres; by default as the scenario's task has it.
+        b0: Base position and torso height, (x, y, z), shape (3,), metres; by default at the origin
+            with the torso as the scenario's task has it.
         pool: Simulations that may be used; by default its own.
 
-    A base that reaches stands still, so the arm is always welded to the origin of the simulated
-    world and the environment is moved into the robot's frame R instead (T_b0 of paper Eq. 3).
+    The simulated world is the robot's frame R, which b0 carries and which stands still during a
+    reach: the environment is moved by -b0 instead (T_b0 of paper Eq. 3).
     """
 
     def __init__(
@@ -41,22 +42,22 @@ class Environment:
         scenario: Scenario,
         instance: ClutterInstance,
         sleep: bool = True,
-        p_WR: Vector | None = None,
-        torso_m: float | None = None,
+        b0: Vector | None = None,
         pool: SimulationPool | None = None,
     ) -> None:
         self.scenario = scenario
         self.instance = instance
-        self.arm = scenario.arm(torso_m)
-        self._torso_m = torso_m
-        self.p_WR = np.zeros(3) if p_WR is None else p_WR
-        self._in_R = instance.translated(-self.p_WR)
+        self.arm = scenario.arm()
+        self.b0 = np.array([0.0, 0.0, scenario.task.torso_m]) if b0 is None else b0
+        self.arm.check_height(height_m := float(self.b0[2]))
+        self._height_m = height_m
+        self._in_R = instance.translated(-self.b0)
         self._whole: Simulation | None = None
         self._waking: PartlyAsleep | None = None
         if sleep and instance.stems is not None:
-            self._waking = StemWakingSimulation(scenario, self._in_R, torso_m)
+            self._waking = StemWakingSimulation(scenario, self._in_R, height_m)
         elif sleep and can_sleep(instance):
-            self._waking = WakingSimulation(scenario, self._in_R, torso_m, pool)
+            self._waking = WakingSimulation(scenario, self._in_R, height_m, pool)
 
     def reach(
         self, p_WG: Vector, x0: Vector, keep_states: bool = False, q: Vector | None = None
@@ -75,18 +76,16 @@ class Environment:
         Returns:
             How it ended. A goal out of the arm's reach is known to fail without simulating it.
         """
-        p_RG = p_WG - self.p_WR
-        if not is_within_reach(self.scenario, p_RG, self._torso_m):
+        p_RG = p_WG - self.b0
+        if not is_within_reach(self.scenario, p_RG):
             return ReachResult("unreachable", ReachTrace(), "the goal is beyond the arm's reach")
-        x0_R = x0.copy()
-        x0_R[:2] -= self.p_WR[:2]
-        angles = self.arm.start_angles(x0_R) if q is None else q[None]
+        angles = self.arm.solve_ik(Start(x0, self.b0).x0_R) if q is None else q[None]
         if not len(angles):
             return ReachResult(
                 "invalid_start", ReachTrace(), "no configuration within the joint limits"
             )
         result = self._simulate(angles, p_RG, keep_states)
-        result.trace.translate(self.p_WR, objects_too=self.instance.stems is None)
+        result.trace.translate(self.b0, objects_too=self.instance.stems is None)
         return result
 
     def _simulate(self, angles: Vector, p_RG: Vector, keep_states: bool) -> ReachResult:
@@ -117,7 +116,7 @@ class Environment:
     def _all_awake(self) -> Simulation:
         """Returns the simulation in which nothing sleeps, built when it is first needed."""
         if self._whole is None:
-            diagram = make_reach_diagram(self.scenario, self._in_R, torso_m=self._torso_m)
+            diagram = make_reach_diagram(self.scenario, self._in_R, height_m=self._height_m)
             self._whole = Simulation(diagram, self.scenario.scene)
         return self._whole
 
@@ -126,17 +125,17 @@ def simulate(
     simulation: Simulation | PartlyAsleep,
     scenario: Scenario,
     q0: Vector,
-    p_WG: Vector,
+    p_RG: Vector,
     keep_states: bool = False,
     arm: Arm | None = None,
 ) -> ReachResult:
-    """Runs a simulation from rest at q0 until a stop rule ends it; the base is at the origin.
+    """Runs a simulation from rest at q0 until a stop rule ends it.
 
     Args:
         simulation: The environment.
         scenario: Gives the control period and the stop rules.
         q0: First joint angles, shape (m,), radians.
-        p_WG: Goal, shape (3,), metres.
+        p_RG: Goal, shape (3,), metres.
         keep_states: Whether the trace is to hold the whole scene.
         arm: The arm; by default as the scenario's task has it.
 
@@ -145,12 +144,12 @@ def simulate(
     """
     arm = scenario.arm() if arm is None else arm
     period_s = scenario.mpc.period_s
-    simulation.begin(q0, p_WG)
+    simulation.begin(q0, p_RG)
     if simulation.is_in_collision():
         return ReachResult(
             "invalid_start", ReachTrace(), "the arm touches the clutter at its start"
         )
-    monitor = StopMonitor(scenario.stop, p_WG, period_s)
+    monitor = StopMonitor(scenario.stop, p_RG, period_s)
     trace = ReachTrace()
     step = 0
     while True:
@@ -166,11 +165,11 @@ def simulate(
             return ReachResult("diverged", trace, " ".join(str(error).split())[:200])
         if not all(map(math.isfinite, q)):
             return ReachResult("diverged", trace, "joint angles are not finite")
-        p_WE = arm.tip_position(q)
-        trace.append(time_s, q, p_WE, forces)
+        p_RE = arm.calc_pose(q).p_RE
+        trace.append(time_s, q, p_RE, forces)
         if keep_states:
             trace.states.append(simulation.state())
-        outcome = monitor.update(time_s, p_WE, trace.peak_force[-1])
+        outcome = monitor.update(time_s, p_RE, trace.peak_force[-1])
         if outcome is not None:
             return ReachResult(outcome, trace)
         simulation.look_around(q)

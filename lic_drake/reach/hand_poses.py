@@ -37,7 +37,7 @@ class HandPoses:
         y = np.linspace(self.line.lower[1], self.line.upper[1], num_y)
         phi = np.linspace(self.line.lower[2], self.line.upper[2], num_phi)
         poses = [np.array([self.line.x_m, yi, phi_i]) for yi in y for phi_i in phi]
-        return np.array([x0 for x0 in poses if self.arm.solve_ik(x0) is not None])
+        return np.array([x0 for x0 in poses if len(self.arm.solve_ik(x0))])
 
     @property
     def y_range(self) -> tuple[float, float]:
@@ -85,7 +85,7 @@ class HandPoses:
         return np.array(positions), np.array(ends)
 
     def _possible(self, y: float, phi: float) -> bool:
-        return self.arm.solve_ik(np.array([self.line.x_m, y, phi])) is not None
+        return len(self.arm.solve_ik(np.array([self.line.x_m, y, phi]))) > 0
 
     def _edge(self, y: float, possible: float, impossible: float) -> float:
         """Returns the last possible orientation on the way to an impossible one."""
@@ -102,4 +102,4 @@ class HandPoses:
         inside = np.all(x0 >= self.line.lower - tolerance) and np.all(
             x0 <= self.line.upper + tolerance
         )
-        return bool(inside) and self.arm.solve_ik(x0) is not None
+        return bool(inside) and len(self.arm.solve_ik(x0)) > 0

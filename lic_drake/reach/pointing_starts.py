@@ -11,17 +11,16 @@ from lic_drake.clutter.board import ApertureBoard
 from lic_drake.clutter.instance import ClutterInstance, make_objects
 from lic_drake.errors import RequestError, ScenarioError
 from lic_drake.reach.scenario import Scenario
-from lic_drake.reach.start import Starts
+from lic_drake.reach.start import Start, Starts
 from lic_drake.reach.task import Stand
-from lic_drake.robots.pr2 import Pr2Arm, pr2_arm
-from lic_drake.robots.pr2_inverse import (
-    ROBOT_TO_CLUTTER,
-    calc_preselection_cost,
-    solve_pointing_from_each,
-)
+from lic_drake.robots.arm import Arm
+from lic_drake.robots.registry import get_robot
 from lic_drake.scene.collision import CollisionChecker
 from lic_drake.scene.scene import SceneConfig
 from lic_drake.types import Vector
+
+ROBOT_TO_CLUTTER = np.array([1.0, 0.0, 0.0])
+"""The paper's x: from the robot to the clutter."""
 
 STEP_M = (0.1, 0.05)
 """Distances of neighbouring places of the base and heights of the torso in the grid, metres."""
@@ -98,8 +97,8 @@ class PointingStarts:
 
     @cached_property
     def checker(self) -> CollisionChecker:
-        """The robot on its wheels before the board; see `mobile_positions`."""
-        return CollisionChecker(Pr2Arm(mobile=True), self.instance, self.scenario.scene)
+        """The mobile robot in front of the board."""
+        return CollisionChecker(self.scenario.arm(), self.instance, self.scenario.scene)
 
     @property
     def grid(self) -> Starts:
@@ -127,10 +126,8 @@ class PointingStarts:
             and np.min(np.linalg.norm(self.p_WA - x0[:3], axis=1)) <= TOLERANCE
         ):
             return None
-        x0_R = x0.copy()
-        x0_R[:2] -= p_WR
-        q = self.scenario.arm(torso_m).start_angles(x0_R)
-        return _first_free(self.checker, q, p_WR, torso_m)
+        b0 = np.append(p_WR, torso_m)
+        return self.checker.first_free(b0, self.scenario.arm().solve_ik(Start(x0, b0).x0_R))
 
     def pre_select(self, p_WA: Vector, b0: Vector) -> tuple[Vector, Vector] | None:
         """Returns the initial condition at an aperture that Eq. (5) prefers, None if there is none.
@@ -142,12 +139,13 @@ class PointingStarts:
         Returns:
             Tool pose in W, shape (7,), and joint angles, shape (7,), radians.
         """
-        return next(_pre_select(self.checker, p_WA[None], b0))
+        return next(_pre_select(self.scenario.arm(), self.checker, p_WA[None], b0))
 
     @cached_property
     def _table(self) -> tuple[Starts, Vector]:
         bare, stand = self._bare_board, self.stand
         conditions, q = _preselect(
+            self.scenario.robot,
             _rows(np.hstack([bare.p_WO, bare.size])),
             _rows(self.all_apertures),
             _steps(stand.y_min_m, stand.y_max_m, STEP_M[0]),
@@ -158,7 +156,7 @@ class PointingStarts:
         apart = np.linalg.norm(conditions.x0[:, None, :3] - self.p_WA, axis=2).min(axis=1)
         free = np.array(
             [
-                near <= TOLERANCE and not self.checker.touches(mobile_positions(b0, row[None])[0])
+                near <= TOLERANCE and not self.checker.touches(b0, row)
                 for near, b0, row in zip(apart, conditions.b0, q, strict=True)
             ]
         )
@@ -179,12 +177,12 @@ def pointing_starts(
         ScenarioError: The robot cannot point, or the environment has no apertures.
     """
     if (
-        not isinstance(scenario.arm(), Pr2Arm)
+        scenario.arm().is_planar
         or instance.p_WA is None
         or not isinstance(scenario.clutter, ApertureBoard)
     ):
         raise ScenarioError(
-            "starts that point into apertures need the robot pr2 and a board of apertures;"
+            "starts that point into apertures need a robot in space and a board of apertures;"
             f" {scenario.category} with {scenario.robot} has other starts"
         )
     return PointingStarts(
@@ -206,20 +204,9 @@ def standing_at(y_m: float, torso_m: float) -> Stand:
     )
 
 
-def mobile_positions(b0: Vector, q: Vector) -> Vector:
-    """Returns the positions of all joints of the mobile robot, shape (n, 11).
-
-    Args:
-        b0: Place of the base and height of the torso, shape (3,), metres.
-        q: Joint angles, shape (n, 7), radians.
-    """
-    x, y, torso_m = b0
-    carried: Vector = np.hstack([np.tile([x, y, 0.0, torso_m], (len(q), 1)), q])
-    return carried
-
-
 @lru_cache(maxsize=64)
 def _preselect(
+    robot: str,
     boxes: tuple[tuple[float, ...], ...],
     p_WA: tuple[tuple[float, ...], ...],
     places: tuple[float, ...],
@@ -230,6 +217,7 @@ def _preselect(
     All environments have the same board, but for what is blocked.
 
     Args:
+        robot: Name of the robot.
         boxes: Position and edges of each of its bars, metres.
         p_WA: Centres of the apertures, metres.
         places: Places of the base, y, metres.
@@ -237,11 +225,12 @@ def _preselect(
     """
     p_WO, edges = np.hsplit(np.array(boxes), 2)
     board = make_objects("box", edges, p_WO)
-    checker = CollisionChecker(Pr2Arm(mobile=True), board, SceneConfig())
+    arm = get_robot(robot)
+    checker = CollisionChecker(arm, board, SceneConfig())
     x0, bases, angles = [], [], []
     for y_m, torso_m in product(places, heights):
         b0 = np.array([0.0, y_m, torso_m])
-        for found in _pre_select(checker, np.array(p_WA), b0):
+        for found in _pre_select(arm, checker, np.array(p_WA), b0):
             if found is not None:
                 x0.append(found[0])
                 bases.append(b0)
@@ -251,17 +240,11 @@ def _preselect(
 
 
 def _pre_select(
-    checker: CollisionChecker, p_WA: Vector, b0: Vector
+    arm: Arm, checker: CollisionChecker, p_WA: Vector, b0: Vector
 ) -> Iterator[tuple[Vector, Vector] | None]:
     """Yields what Eq. (5) prefers at each aperture; see `PointingStarts.pre_select`."""
-    torso_m = float(b0[2])
-    arm = pr2_arm().raised(torso_m)
-    p_RA = p_WA - [b0[0], b0[1], 0.0]
-    for p_WE, q in zip(
-        p_WA, solve_pointing_from_each(arm.kinematics, p_RA, ROBOT_TO_CLUTTER), strict=True
-    ):
-        cost = calc_preselection_cost(arm.kinematics, q)
-        free = _first_free(checker, q[np.argsort(cost, kind="stable")], b0[:2], torso_m)
+    for p_WE, q in zip(p_WA, arm.solve_pointing(p_WA - b0, ROBOT_TO_CLUTTER), strict=True):
+        free = checker.first_free(b0, q)
         if free is None:
             yield None
             continue
@@ -269,16 +252,6 @@ def _pre_select(
         # Exactly the centre, and no negative zeros: they would make another key of the same start.
         pose[:3] = p_WE
         yield pose + 0.0, free
-
-
-def _first_free(
-    checker: CollisionChecker, q: Vector, p_WR: Vector, torso_m: float
-) -> Vector | None:
-    """Returns the first configuration, shape (7,), in which the arm touches nothing, if any."""
-    carried = mobile_positions(np.append(p_WR, torso_m), q)
-    return next(
-        (row for row, all_of in zip(q, carried, strict=True) if not checker.touches(all_of)), None
-    )
 
 
 def _steps(low: float, high: float, step: float) -> tuple[float, ...]:

@@ -93,7 +93,7 @@ class ReachRequest:
         plain = Start(start.x0, start.b0)
         found = [
             cls(scenario, record.stream, record.environment, record.p_WG, first, after)
-            for after in _read_after(record, len(scenario.arm().q_min))
+            for after in _read_after(record, scenario.arm().num_joints)
             for first in ((plain,) if start.q is None else (plain, start))
         ]
         return next((item for item in found if item._key(record.scenario) == record.key), found[0])
@@ -116,7 +116,7 @@ def _checked(scenario: Scenario, start: Start) -> Start:
         RequestError: It is of another kind of robot.
     """
     arm = scenario.arm()
-    size = IN_PLANE if arm.surface is None else IN_SPACE
+    size = arm.pose_size
     if start.x0.shape != (size,):
         raise RequestError(
             f"a start of {scenario.robot} has {size} numbers ({', '.join(POSE_AXES[size])}), got"
@@ -124,13 +124,13 @@ def _checked(scenario: Scenario, start: Start) -> Start:
         )
     if start.q is None:
         return start
-    if start.q.shape != arm.q_min.shape:
+    if len(start.q) != arm.num_joints:
         raise RequestError(
             f"{scenario.robot} has {len(arm.q_min)} joint angles, the start has {len(start.q)}"
         )
     if size == IN_PLANE:
         only = arm.solve_ik(start.x0_R)
-        if only is not None and np.allclose(start.q, only, rtol=0.0, atol=1e-9):
+        if len(only) and np.allclose(start.q, only[0], rtol=0.0, atol=1e-9):
             return replace(start, q=None)
     return start
 
@@ -276,39 +276,37 @@ class ReachRecord:
         return np.array([getattr(self, f"{name}_{axis}") for axis in axes])
 
 
-def check_goal(scenario: Scenario, p_RG: Vector, torso_m: float | None = None) -> None:
+def check_goal(scenario: Scenario, p_RG: Vector) -> None:
     """Refuses goals that no reach could come to.
 
     Args:
         scenario: Robot and success distance.
-        p_RG: The goal as seen from the base, shape (3,), metres.
-        torso_m: Height of the torso, metres; by default as the scenario's task has it.
+        p_RG: The goal, shape (3,), metres.
 
     Raises:
         RequestError: The goal is not finite or further away than the arm reaches.
     """
     if p_RG.shape != (3,) or not np.all(np.isfinite(p_RG)):
         raise RequestError(f"a goal is three finite numbers in metres, got {p_RG.tolist()}")
-    if not is_within_reach(scenario, p_RG, torso_m):
-        arm = scenario.arm(torso_m)
+    if not is_within_reach(scenario, p_RG):
+        arm = scenario.arm()
         distance = np.linalg.norm(p_RG - arm.p_RS)
-        shown = ", ".join(f"{x:g}" for x in (p_RG[:2] if arm.surface is None else p_RG))
+        shown = ", ".join(f"{x:g}" for x in (p_RG[:2] if arm.is_planar else p_RG))
         raise RequestError(
             f"the goal ({shown}) m is {distance:.3f} m from the"
-            f" {'base' if arm.surface is None else 'shoulder'} and the arm reaches"
+            f" {'base' if arm.is_planar else 'shoulder'} and the arm reaches"
             f" {_farthest_goal_m(arm, scenario):.3f} m; choose a nearer goal"
         )
 
 
-def is_within_reach(scenario: Scenario, p_RG: Vector, torso_m: float | None = None) -> bool:
+def is_within_reach(scenario: Scenario, p_RG: Vector) -> bool:
     """Tells whether the straight arm could come near enough to a goal to succeed.
 
     Args:
         scenario: Robot and success distance.
         p_RG: The goal, shape (3,), metres.
-        torso_m: Height of the torso, metres; by default as the scenario's task has it.
     """
-    arm = scenario.arm(torso_m)
+    arm = scenario.arm()
     return float(np.linalg.norm(p_RG - arm.p_RS)) < _farthest_goal_m(arm, scenario)
 
 

@@ -46,8 +46,7 @@ def environment_of(request: ReachRequest, sleep: bool = True) -> Environment:
             request.scenario,
             instance_of(request),
             sleep,
-            p_WR=np.append(request.start.b0[:2], 0.0),
-            torso_m=float(request.start.b0[2]),
+            b0=request.start.b0,
             pool=_pool,
         )
     return _environments[key]
@@ -111,8 +110,9 @@ def make_record(request: ReachRequest, result: ReachResult, wall_time_s: float) 
     if nothing:
         final = np.full(len(x0), np.nan)
     else:
-        final = scenario.arm(float(b0[2])).tip_pose(trace.q[-1])
-    final[:2] += b0[:2]
+        final = scenario.arm().tip_pose(trace.q[-1])
+    axes = 3 if len(x0) == IN_SPACE else 2
+    final[:axes] += b0[:axes]
     still_s = scenario.stop.stuck_time_s if outcome == "stuck" else 0.0
     velocity = np.full(3, np.nan) if nothing else trace.final_velocity(still_s)
     distances = np.linalg.norm(np.array(trace.p_WE).reshape(-1, 3) - request.goal, axis=1)

@@ -51,16 +51,9 @@ class Scenario:
         values = json.dumps(_identity(self), sort_keys=True, default=repr)
         return hashlib.sha256(values.encode()).hexdigest()[:12]
 
-    def arm(self, torso_m: float | None = None) -> Arm:
-        """Returns the robot.
-
-        Args:
-            torso_m: Height of its torso, metres; by default as the task has it.
-
-        Raises:
-            ScenarioError: The torso cannot go there.
-        """
-        return get_robot(self.robot).raised(self.task.torso_m if torso_m is None else torso_m)
+    def arm(self) -> Arm:
+        """Returns the robot's arm, in its frame R."""
+        return get_robot(self.robot)
 
     def sample_instance(self, stream: str, environment: int) -> ClutterInstance:
         """Draws the environment with this index in a seed stream."""
@@ -165,7 +158,7 @@ def parse_scenario(content: str | bytes, overrides: str = "", source: str = "sce
         mpc=read_section(MpcConfig, mpc, f"{source}: mpc", defaults=PRESETS[preset]()),
         stop=read_section(StopConfig, data.get("stop"), f"{source}: stop"),
     )
-    scenario.arm()  # Refuses a torso out of its range.
+    scenario.arm().check_height(scenario.task.torso_m)
     if scenario.task.goal_area is None and len(scenario.goals("training", 0)) == 0:
         raise ScenarioError(
             f"{source}: task: goal_area cannot be null, because an environment of"

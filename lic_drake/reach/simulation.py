@@ -6,6 +6,7 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.reach.diagram import ReachDiagram
 from lic_drake.reach.trace import SceneState
+from lic_drake.robots.arm import Arm
 from lic_drake.scene.collision import is_touching
 from lic_drake.scene.furnish import furnish
 from lic_drake.scene.scene import SceneConfig
@@ -28,7 +29,7 @@ class Simulation:
         scene = reach_diagram.scene
         self._plant, self._arm, self._clutter = scene.plant, scene.arm, scene.clutter
         self._instance: ClutterInstance | None = None
-        self._torso_m: float | None = None
+        self._height_m: float | None = None
         self._context = reach_diagram.diagram.CreateDefaultContext()
         self._plant_context = scene.plant.GetMyMutableContextFromRoot(self._context)
         self._num_axes = scene.num_axes
@@ -37,17 +38,18 @@ class Simulation:
         )
         self._taxel_force = reach_diagram.diagram.GetOutputPort("taxel_force")
 
-    def furnish(self, instance: ClutterInstance, torso_m: float) -> None:
+    def furnish(self, instance: ClutterInstance, arm: Arm, height_m: float) -> None:
         """Puts the fixed objects of another environment in the place of those that are there.
 
         Args:
             instance: As many fixed objects, and the same movable ones.
-            torso_m: Height of the torso, metres.
+            arm: The arm.
+            height_m: How far R is above the robot's floor, metres.
         """
-        if instance is not self._instance or torso_m != self._torso_m:
+        if instance is not self._instance or height_m != self._height_m:
             furnish(self._reach_diagram.scene, self._context, instance)
-            self._reach_diagram.set_torso(self._context, torso_m)
-            self._instance, self._torso_m = instance, torso_m
+            arm.set_height(self._plant, self._plant_context, self._arm, height_m)
+            self._instance, self._height_m = instance, height_m
 
     @property
     def num_movable(self) -> int:
@@ -59,16 +61,16 @@ class Simulation:
         """Time on the clock, seconds."""
         return float(self._context.get_time())
 
-    def begin(self, q: Vector, p_WG: Vector, time_s: float = 0.0) -> None:
+    def begin(self, q: Vector, p_RG: Vector, time_s: float = 0.0) -> None:
         """Puts the arm at rest at q and every object where the environment has it.
 
         Args:
             q: Joint angles, shape (m,), radians.
-            p_WG: Goal, shape (3,), metres.
+            p_RG: Goal, shape (3,), metres.
             time_s: Time on the clock, seconds.
         """
         self._context.SetTime(time_s)
-        self._reach_diagram.set_start(self._context, q, p_WG)
+        self._reach_diagram.set_start(self._context, q, p_RG)
         p_WO = self._p_WO_first
         self.set_state(self.state()._replace(p_WO=p_WO, v_WO=np.zeros_like(p_WO)))
         # A new one, because an integrator's memory would make a reach depend on the one before.

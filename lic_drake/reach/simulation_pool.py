@@ -21,15 +21,13 @@ class SimulationPool:
     def __init__(self) -> None:
         self._simulations: dict[tuple[object, ...], Simulation] = {}
 
-    def get(
-        self, scenario: Scenario, instance: ClutterInstance, torso_m: float | None
-    ) -> Simulation:
-        """Returns a simulation of an instance, with the torso at a height.
+    def get(self, scenario: Scenario, instance: ClutterInstance, height_m: float) -> Simulation:
+        """Returns a simulation of an instance, with R at a height above the robot's floor.
 
         Args:
             scenario: Robot, contact, controller.
             instance: The clutter.
-            torso_m: Height of the torso, metres; None as the scenario's task has it.
+            height_m: Height of R, metres.
         """
         key = (scenario.digest, *_kind(instance))
         if key not in self._simulations:
@@ -37,10 +35,10 @@ class SimulationPool:
                 self._simulations.clear()
                 # Diagrams with Python systems are reference cycles: only the collector frees them.
                 gc.collect()
-            diagram = make_reach_diagram(scenario, instance, torso_m=torso_m)
+            diagram = make_reach_diagram(scenario, instance, height_m=height_m)
             self._simulations[key] = Simulation(diagram, scenario.scene)
         simulation = self._simulations[key]
-        simulation.furnish(instance, scenario.arm(torso_m).torso_m)
+        simulation.furnish(instance, scenario.arm(), height_m)
         return simulation
 
 

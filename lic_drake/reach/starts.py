@@ -14,7 +14,6 @@ from lic_drake.reach.pointing_starts import pointing_starts, standing_at
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.start import Starts as StartBatch
 from lic_drake.reach.task import BaseTrack, StartLine
-from lic_drake.robots.pr2 import Pr2Arm
 from lic_drake.robots.registry import get_robot
 from lic_drake.seeds import make_generator
 from lic_drake.types import Vector
@@ -112,7 +111,8 @@ def _planar_angles(starts: PlanarStarts, x0: Vector, p_WR: Vector) -> Vector | N
     """Returns the joint angles of a planar arm that starts so, None if it cannot."""
     if not is_possible(starts, x0, p_WR):
         return None
-    return starts.poses.arm.solve_ik(x0 - [*p_WR, 0.0])
+    q: Vector = starts.poses.arm.solve_ik(x0 - [*p_WR, 0.0])[0]
+    return q
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -229,7 +229,7 @@ def make_starts(scenario: Scenario, instance: ClutterInstance, moves: bool = Tru
         moves: Whether a PR2 may move its base and torso as the task allows; without, they stay
             where they are.
     """
-    if isinstance(scenario.arm(), Pr2Arm):
+    if not scenario.arm().is_planar:
         return pointing_starts(scenario, instance, scenario.task.stand if moves else None)
     return planar_starts(scenario, instance)
 
@@ -249,7 +249,7 @@ def training_starts(scenario: Scenario, stream: str, environment: int) -> StartB
     (paper IV-A), and random ones at each aperture for a mobile base, whose grid would be far larger
     than the paper's 15 reaches an environment.
     """
-    if isinstance(scenario.arm(), Pr2Arm):
+    if not scenario.arm().is_planar:
         stand = scenario.task.stand
         place = (0.0, scenario.task.torso_m) if stand is None else stand.for_training(environment)
         instance = scenario.sample_instance(stream, environment)

@@ -25,25 +25,23 @@ class StemWakingSimulation(PartlyAsleep):
     When the arm comes near a stem, the reach goes on in a diagram that has it, too.
     """
 
-    def __init__(
-        self, scenario: Scenario, instance: ClutterInstance, torso_m: float | None = None
-    ) -> None:
+    def __init__(self, scenario: Scenario, instance: ClutterInstance, height_m: float) -> None:
         assert instance.stems is not None
         self._scenario = scenario
         self._instance = instance
         self._stems = instance.stems
-        self._torso_m = torso_m
-        self._axes = SkinAxes(scenario.arm(torso_m), num_axes=3)
+        self._height_m = height_m
+        self._axes = SkinAxes(scenario.arm(), num_axes=3)
         self._springy = ~self._stems.fixed
         self._diagrams: dict[bytes, Simulation] = {}
 
-    def begin(self, q: Vector, p_WG: Vector, time_s: float = 0.0) -> None:
+    def begin(self, q: Vector, p_RG: Vector, time_s: float = 0.0) -> None:
         """Puts the arm at rest at q and every stem upright."""
-        self._p_WG = p_WG
+        self._p_RG = p_RG
         self._monitor = StemMonitor(self._stems, self._axes)
         self._monitor.wake_near(q)
         self._now = self._with_awake()
-        self._now.begin(q, p_WG, time_s)
+        self._now.begin(q, p_RG, time_s)
 
     def state(self) -> SceneState:
         """Returns the present state of the arm and of all stems that can bend."""
@@ -61,7 +59,7 @@ class StemWakingSimulation(PartlyAsleep):
             return
         awake = self._monitor.is_awake[self._springy]
         self._now = self._with_awake()
-        self._now.begin(state.q, self._p_WG, before.time_s)
+        self._now.begin(state.q, self._p_RG, before.time_s)
         self._now.take_over_control(before)
         self._now.set_state(state._replace(p_WO=state.p_WO[awake], v_WO=state.v_WO[awake]))
 
@@ -74,6 +72,6 @@ class StemWakingSimulation(PartlyAsleep):
                 # Diagrams with Python systems are reference cycles: only the collector frees them.
                 gc.collect()
             present = replace(self._instance, stems=self._stems.subset(awake))
-            diagram = make_reach_diagram(self._scenario, present, torso_m=self._torso_m)
+            diagram = make_reach_diagram(self._scenario, present, height_m=self._height_m)
             self._diagrams[key] = Simulation(diagram, self._scenario.scene)
         return self._diagrams[key]

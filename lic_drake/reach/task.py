@@ -53,7 +53,7 @@ class StartLine:
         y = _steps(self.y_min_m, self.y_max_m, self.y_step_m)
         phi = np.deg2rad(_steps(self.phi_min_deg, self.phi_max_deg, self.phi_step_deg))
         poses = [np.array([self.x_m, yi, phi_i]) for yi in y for phi_i in phi]
-        return np.array([x0 for x0 in poses if arm.solve_ik(x0) is not None])
+        return np.array([x0 for x0 in poses if len(arm.solve_ik(x0))])
 
 
 @dataclass(kw_only=True)

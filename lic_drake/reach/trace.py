@@ -38,7 +38,7 @@ class ReachTrace:
         total_force: Sum of the taxel forces, N.
         contacts: Number of loaded taxels.
         states: The state of the scene at each sample, if it was asked for.
-        p_WR: Position of the arm's base, shape (3,), metres.
+        p_WR: Position of R, b0, shape (3,), metres.
         p_WO: Positions of the movable objects when the reach ended, shape (n, 2) or (n, 3), metres;
             None where it never began or they are not finite.
     """

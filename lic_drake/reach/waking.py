@@ -22,15 +22,15 @@ class PartlyAsleep(ABC):
     """A simulation without what sleeps in it, used as a `Simulation`."""
 
     _now: Simulation
-    _p_WG: Vector
+    _p_RG: Vector
 
     @abstractmethod
-    def begin(self, q: Vector, p_WG: Vector, time_s: float = 0.0) -> None:
+    def begin(self, q: Vector, p_RG: Vector, time_s: float = 0.0) -> None:
         """Puts the arm at rest at q and every object where the environment has it.
 
         Args:
             q: Joint angles, shape (m,), radians.
-            p_WG: Goal, shape (3,), metres.
+            p_RG: Goal, shape (3,), metres.
             time_s: Time on the clock, seconds.
         """
 
@@ -56,7 +56,7 @@ class PartlyAsleep(ABC):
     def find_free(self, angles: Vector) -> Vector | None:
         """Returns the first joint angles with which the arm touches nothing; see `Simulation`."""
         for q in angles:
-            self.begin(q, self._p_WG)
+            self.begin(q, self._p_RG)
             if not self.is_in_collision():
                 free: Vector = q
                 return free
@@ -86,24 +86,24 @@ class WakingSimulation(PartlyAsleep):
         self,
         scenario: Scenario,
         instance: ClutterInstance,
-        torso_m: float | None = None,
+        height_m: float = 0.0,
         pool: SimulationPool | None = None,
     ) -> None:
         self._scenario = scenario
         self._pool = SimulationPool() if pool is None else pool
         self._instance = instance
-        self._torso_m = torso_m
-        self._axes = SkinAxes(scenario.arm(torso_m), instance.num_axes)
+        self._height_m = height_m
+        self._axes = SkinAxes(scenario.arm(), instance.num_axes)
         self._num_movable = int(np.count_nonzero(instance.movable))
         self._asleep: dict[int, ClutterInstance] = {}
 
-    def begin(self, q: Vector, p_WG: Vector, time_s: float = 0.0) -> None:
+    def begin(self, q: Vector, p_RG: Vector, time_s: float = 0.0) -> None:
         """Puts the arm at rest at q and every object where the environment has it."""
-        self._p_WG = p_WG
+        self._p_RG = p_RG
         self._awake: list[int] = []  # In the order of the spares that stand for them.
         self._monitor = SleepMonitor(self._instance, self._axes, q)
         self._now = self._with_spares(0)
-        self._now.begin(q, p_WG, time_s)
+        self._now.begin(q, p_RG, time_s)
         self.look_around(q)
 
     def state(self) -> SceneState:
@@ -127,7 +127,7 @@ class WakingSimulation(PartlyAsleep):
         n = len(self._awake)
         if n > before.num_movable:
             self._now = self._with_spares(self._enough_spares(n))
-            self._now.begin(state.q, self._p_WG, before.time_s)
+            self._now.begin(state.q, self._p_RG, before.time_s)
             self._now.take_over_control(before)
         spares = self._now.state()
         p_WO, v_WO = spares.p_WO.copy(), spares.v_WO.copy()
@@ -137,7 +137,7 @@ class WakingSimulation(PartlyAsleep):
     def _with_spares(self, spares: int) -> Simulation:
         if spares not in self._asleep:
             self._asleep[spares] = put_to_sleep(self._instance, spares)
-        return self._pool.get(self._scenario, self._asleep[spares], self._torso_m)
+        return self._pool.get(self._scenario, self._asleep[spares], self._height_m)
 
     def _enough_spares(self, awake: int) -> int:
         spares = FEWEST_SPARES

@@ -1,118 +1,355 @@
-"""What the other rooms ask of a robot arm."""
+"""`Arm`: a robot arm with an impedance controller and a tactile skin, from a model file."""
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
+from pydrake.geometry import Box, SceneGraph
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import Frame, ModelInstanceIndex
+from pydrake.multibody.tree import (
+    FixedOffsetFrame,
+    Frame,
+    ModelInstanceIndex,
+    PrismaticJoint,
+    RevoluteJoint,
+    SpatialInertia,
+    UnitInertia,
+)
+from pydrake.systems.framework import Context
 
-from lic_drake.types import Vector
+from lic_drake.errors import ScenarioError
+from lic_drake.robots.kinematics import ArmGeometry, ArmPose, Kinematics, PlantKinematics
+from lic_drake.robots.skin import read_skin
+from lic_drake.types import IntVector, Vector
 
-if TYPE_CHECKING:
-    from lic_drake.robots.skin_shape import SkinShape
-
-
-@dataclass(frozen=True, kw_only=True)
-class SkinCapsule:
-    """A capsule of the arm's surface.
-
-    Attributes:
-        link: Name of the body that carries it.
-        radius: Metres.
-        length: Length of the cylindrical part, metres.
-        R_LC: Rotation of the capsule frame C (axis along Cz) in the link frame, shape (3, 3).
-        p_LC: Position of the capsule's centre in the link frame, shape (3,), metres.
-    """
-
-    link: str
-    radius: float
-    length: float
-    R_LC: Vector
-    p_LC: Vector
+_FLOOR = "floor_mount"
+_BASE_COLOR = np.array([0.35, 0.35, 0.38, 1.0])
 
 
-class Arm(Protocol):
-    """An arm with an impedance controller and a skin; all vectors are in its base frame R.
+class Arm:
+    """An arm on a base that stands still during a reach; all vectors are in its base frame R.
 
-    Attributes:
+    All joints of the model that are neither held nor those of the carriage are the arm's. They must
+    be revolute, with limits and with an actuator that has controller gains: the joint impedance,
+    which Drake integrates implicitly.
+
+    Args:
         name: Name in scenario files.
-        link_names: Names of the bodies that carry skin, proximal to distal.
+        model: The model: URDF or SDF file, or URDF text.
+        base_frame: Frame that is welded to R.
+        tip_frame: Frame E of the hand, which points along Ex.
+        skin_links: Bodies that carry skin, proximal to distal; by default those that the joints
+            move and that have collision geometry. All their collision shapes are skin.
+        q_min: Lower joint limits, shape (m,), radians, where narrower than the model's.
+        q_max: Upper joint limits, shape (m,), radians.
+        held: Joints that are held at positions, metres or radians.
+        carriage: The joints along x, y and z that carry R in the model of a mobile robot: those
+            of its base and its torso.
+        height_range_m: Lowest and highest position of R along z, metres.
+        is_planar: Whether the arm moves in the plane z = 0; hand poses are then (x, y, phi).
+        kinematics: Makes kinematics in closed form; by default they come from the model.
+
+    Attributes:
+        link_names: Names of the bodies that carry skin.
+        skin: Their collision shapes.
         q_min: Lower joint limits, shape (m,), radians.
         q_max: Upper joint limits, shape (m,), radians.
         stiffness: Joint stiffness of the impedance controller, shape (m,), Nm/rad.
-        p_RS: The point about which the whole arm turns, shape (3,), metres.
-        reach_m: Largest distance of the tip from it, metres.
-        torso_m: Height of the torso that carries it, metres; 0 without one.
-        torso_frame: Name of the plant's frame whose position along its parent's z is that height;
-            empty without a torso.
-        skin: The surface of the arm, as capsules or by capsules around it.
+        damping: Its joint damping, shape (m,), Nms/rad.
+        p_RS: The first joint, about which the whole arm turns, shape (3,), metres.
+        reach_m: Upper bound of the tip's distance from it, metres.
+        kinematics: See `calc_pose`, `solve_ik` and `solve_pointing`.
+        b0_index: Indices of b0 among the positions of a mobile arm, shape (3,).
+        q_index: Indices of the joint angles among them, shape (m,).
+
+    Raises:
+        ScenarioError: The model cannot be read or is not such an arm.
     """
 
-    name: str
-    link_names: tuple[str, ...]
-    q_min: Vector
-    q_max: Vector
-    stiffness: Vector
-    p_RS: Vector
-    reach_m: float
-    torso_m: float
-    torso_frame: str
-    skin: tuple[SkinCapsule, ...]
+    def __init__(
+        self,
+        name: str,
+        model: str | Path,
+        *,
+        base_frame: str = "base",
+        tip_frame: str = "tip",
+        skin_links: Sequence[str] | None = None,
+        q_min: Vector | None = None,
+        q_max: Vector | None = None,
+        held: Mapping[str, float] | None = None,
+        carriage: tuple[str, str, str] | None = None,
+        height_range_m: tuple[float, float] = (-np.inf, np.inf),
+        is_planar: bool = False,
+        kinematics: Callable[[ArmGeometry], Kinematics] | None = None,
+    ) -> None:
+        self.name = name
+        self.is_planar = is_planar
+        self.base_frame, self.tip_frame = base_frame, tip_frame
+        self._model = model
+        self._held = dict(held or {})
+        self._carriage = carriage
+        self.height_range_m = height_range_m
+        plant = MultibodyPlant(time_step=1e-3)
+        scene_graph = SceneGraph()
+        plant.RegisterAsSourceForSceneGraph(scene_graph)
+        try:
+            self._read(plant, scene_graph, skin_links, (q_min, q_max), kinematics)
+        except (OSError, RuntimeError, ValueError) as error:
+            raise ScenarioError(
+                f"the model of {name} does not describe {'a planar' if is_planar else 'an'} arm:"
+                f" {' '.join(str(error).split())}"
+            ) from error
+        self._last: tuple[bytes, ArmPose] = (b"", self.kinematics.calc_pose(self.q_min))
 
     @property
-    def surface(self) -> "tuple[SkinShape, ...] | None":
-        """The surface itself where its shapes are not capsules."""
-        ...
+    def num_joints(self) -> int:
+        """Number of joints m."""
+        return len(self.q_min)
 
-    def raised(self, torso_m: float) -> "Arm":
-        """Returns the arm on a torso of this height, metres.
+    @property
+    def pose_size(self) -> int:
+        """Length of a hand pose x0: 3 in the plane, else 7."""
+        return 3 if self.is_planar else 7
 
-        Raises:
-            ScenarioError: The robot's torso cannot go there.
-        """
-        ...
+    def calc_pose(self, q: Vector) -> ArmPose:
+        """Returns where links and tip are at joint angles q, shape (m,), with Jacobians."""
+        # Sensor, controller and stop rules ask for the same configuration, one after the other.
+        key = q.tobytes()
+        if key != self._last[0]:
+            self._last = (key, self.kinematics.calc_pose(q))
+        return self._last[1]
 
-    def add_to_plant(
-        self, plant: MultibodyPlant, parent: Frame | None = None
-    ) -> ModelInstanceIndex:
-        """Adds the arm with its joint impedance, its base welded to a frame, else to the world."""
-        ...
-
-    def solve_ik(self, x0: Vector) -> Vector | None:
-        """Returns the configuration for the hand pose x0, shape (m,), or None."""
-        ...
-
-    def start_angles(self, x0: Vector) -> Vector:
-        """Returns the configurations for the hand pose x0, shape (n, m), those to prefer first.
-
-        Which of them touch anything is not looked at.
-        """
-        ...
-
-    def tip_pose(self, q: Vector) -> Vector:
-        """Returns the hand pose x0 of the configuration q."""
-        ...
-
-    def tip_position(self, q: Vector) -> Vector:
-        """Returns p_RE, shape (3,), metres."""
-        ...
-
-    def tip_jacobian(self, q: Vector) -> Vector:
-        """Returns Jv_v_RE, shape (3, m), m/rad."""
-        ...
-
-    def link_poses(self, q: Vector) -> tuple[Vector, Vector]:
-        """Returns R_RL, shape (k, 3, 3), and p_RL, shape (k, 3), of the skin links."""
-        ...
-
-    def point_jacobians(self, q: Vector, links: NDArray[np.intp], p_RQ: Vector) -> Vector:
+    def point_jacobians(self, pose: ArmPose, links: IntVector, p_RQ: Vector) -> Vector:
         """Returns Jv_v_RQ of points Q on skin links, shape (n, 3, m), m/rad.
 
         Args:
-            q: Joint angles, shape (m,), radians.
+            pose: The arm's pose.
             links: Index into `link_names` of each point's link, shape (n,).
             p_RQ: Positions of the points, shape (n, 3), metres.
         """
-        ...
+        jacobians: Vector = (p_RQ @ pose.turn).reshape(-1, 3, self.num_joints) - pose.moment
+        jacobians *= self._moves[links][:, None]
+        return jacobians
+
+    def tip_pose(self, q: Vector) -> Vector:
+        """Returns the hand pose x0 in R of joint angles q, shape (pose_size,)."""
+        return self.kinematics.tip_pose(q)
+
+    def solve_ik(self, x0_R: Vector, near: Vector | None = None) -> Vector:
+        """Returns joint angles for a hand pose, shape (n, m), see `Kinematics.solve_ik`."""
+        return self.kinematics.solve_ik(x0_R, near)
+
+    def solve_pointing(self, p_RE: Vector, u_R: Vector) -> list[Vector]:
+        """Returns joint angles that point from places; see `Kinematics.solve_pointing`."""
+        return self.kinematics.solve_pointing(p_RE, u_R)
+
+    def positions(self, b0: Vector, q: Vector) -> Vector:
+        """Returns the positions of the mobile arm in a plant, shape (.., 3 + m).
+
+        Args:
+            b0: Position of R, shape (3,), metres.
+            q: Joint angles, shape (.., m), radians.
+        """
+        return np.concatenate([np.broadcast_to(b0, (*q.shape[:-1], 3)), q], axis=-1)
+
+    def add_to_plant(
+        self,
+        plant: MultibodyPlant,
+        parent: Frame | None = None,
+        mobile: bool = False,
+        height_m: float = 0.0,
+    ) -> ModelInstanceIndex:
+        """Adds the arm without gravity: arms are balanced or move in a horizontal plane.
+
+        Args:
+            plant: The plant, not yet finalized.
+            parent: The frame that becomes R; by default the world's.
+            mobile: Whether b0 = (x, y, z) are positions, too: those of joints that carry R, which
+                nothing drives. For drawings and for a robot that looks for a place to reach from.
+            height_m: Where the arm does not move but its robot has a torso, how far R is above the
+                robot's floor, metres; see `set_height`.
+        """
+        (arm,) = _parse(plant, self._model)
+        plant.set_gravity_enabled(arm, False)
+        held = dict(self._held)
+        parent = parent or plant.world_frame()
+        if mobile and self._carriage is None:
+            parent = _add_carriage(plant, arm, parent)
+        elif self._carriage is not None and not mobile:
+            held |= dict(zip(self._carriage, (0.0, 0.0, height_m), strict=True))
+            X_RF = RigidTransform(np.array([0.0, 0.0, -height_m]))
+            parent = plant.AddFrame(FixedOffsetFrame(_FLOOR, parent, X_RF, arm))
+        plant.WeldFrames(parent, plant.GetFrameByName(self.base_frame, arm))
+        _hold_joints(plant, arm, held)
+        return arm
+
+    def set_height(
+        self, plant: MultibodyPlant, context: Context, arm: ModelInstanceIndex, height_m: float
+    ) -> None:
+        """Moves the robot's body to another height of its torso; arm and R stay where they are.
+
+        The one place where a reach's diagram knows of a torso: the body hangs from R, and arm and
+        body must not collide.
+
+        Args:
+            plant: A plant with the arm that is not mobile.
+            context: The plant's context.
+            arm: The arm in it.
+            height_m: How far R is above the robot's floor, metres.
+        """
+        if self._carriage is not None:
+            for name, z in ((_FLOOR, -height_m), (self._carriage[2], height_m)):
+                frame = cast(FixedOffsetFrame, plant.GetFrameByName(name, arm))
+                frame.SetPoseInParentFrame(context, RigidTransform(np.array([0.0, 0.0, z])))
+
+    def check_height(self, height_m: float) -> None:
+        """Raises a `ScenarioError` if R cannot be at a height, metres."""
+        low, high = self.height_range_m
+        if not low <= height_m <= high:
+            raise ScenarioError(
+                f"the torso of {self.name} must be from {low} to {high} m high, got {height_m}"
+            )
+
+    def _read(
+        self,
+        plant: MultibodyPlant,
+        scene_graph: SceneGraph,
+        skin_links: Sequence[str] | None,
+        limits: tuple[Vector | None, Vector | None],
+        kinematics: Callable[[ArmGeometry], Kinematics] | None,
+    ) -> None:
+        """Takes everything but names from the model.
+
+        Raises:
+            RuntimeError: Drake cannot parse it, or misses something in it.
+            ValueError: It is not an arm as this class knows it.
+        """
+        arm = self.add_to_plant(plant)
+        plant.Finalize()
+        joints = [plant.get_joint(index) for index in plant.GetJointIndices(arm)]
+        joints = [joint for joint in joints if joint.num_positions()]
+        joints.sort(key=lambda joint: joint.position_start())
+        for joint in joints:
+            if not isinstance(joint, RevoluteJoint):
+                raise ValueError(f"joint {joint.name()} is not revolute; hold it at a position")
+        if not joints or len(joints) != plant.num_positions():
+            raise ValueError(
+                f"it has {len(joints)} revolute joints and {plant.num_positions()} positions"
+            )
+        low, high = (
+            np.array(end)
+            for end in (plant.GetPositionLowerLimits(), plant.GetPositionUpperLimits())
+        )
+        self.q_min = low if limits[0] is None else np.maximum(low, limits[0])
+        self.q_max = high if limits[1] is None else np.minimum(high, limits[1])
+        if not np.all(np.isfinite([self.q_min, self.q_max])):
+            raise ValueError("a joint has no limits; give q_min and q_max")
+        actuators = {
+            actuator.joint().name(): actuator
+            for actuator in map(plant.get_joint_actuator, plant.GetJointActuatorIndices(arm))
+        }
+        for joint in joints:
+            if joint.name() not in actuators or not actuators[joint.name()].has_controller():
+                raise ValueError(f"joint {joint.name()} needs an actuator with controller gains")
+        gains = [actuators[joint.name()].get_controller_gains() for joint in joints]
+        self.stiffness = np.array([gain.p for gain in gains])
+        self.damping = np.array([gain.d for gain in gains])
+
+        moved = [plant.GetBodiesKinematicallyAffectedBy([joint.index()]) for joint in joints]
+        if skin_links is None:
+            skin_links = [
+                body.name()
+                for body in map(plant.get_body, moved[0])
+                if plant.GetCollisionGeometriesForBody(body)
+            ]
+        self.link_names = tuple(skin_links)
+        links = [plant.GetBodyByName(link, arm) for link in skin_links]
+        inspector = scene_graph.model_inspector()
+        self.skin = tuple(shape for link in links for shape in read_skin(plant, inspector, link))
+        if {shape.link for shape in self.skin} != set(self.link_names) or not self.skin:
+            raise ValueError("every skin link needs a collision shape")
+        if self.is_planar and any(shape.kind != "capsule" for shape in self.skin):
+            raise ValueError("the skin of a planar arm must be capsules")
+        self._moves = np.array([[float(link.index() in by) for by in moved] for link in links])
+
+        context = plant.CreateDefaultContext()
+        tip = plant.GetFrameByName(self.tip_frame, arm)
+        frames = [joint.frame_on_parent() for joint in joints] + [tip]
+        p_RJ = np.array([frame.CalcPoseInWorld(context).translation() for frame in frames])
+        self.p_RS = p_RJ[0]
+        self.reach_m = float(np.linalg.norm(np.diff(p_RJ, axis=0), axis=1).sum())
+        self.b0_index, self.q_index = np.arange(3), np.arange(3, 3 + len(joints))
+        geometry = ArmGeometry(
+            is_planar=self.is_planar, q_min=self.q_min, q_max=self.q_max, p_RJ=p_RJ
+        )
+        numerical = PlantKinematics(geometry, plant, [link.body_frame() for link in links], tip)
+        self.kinematics: Kinematics = numerical
+        if kinematics is not None:
+            self.kinematics = kinematics(geometry)
+            _compare(self.kinematics, numerical)
+
+
+def _compare(closed_form: Kinematics, numerical: Kinematics) -> None:
+    """Checks kinematics in closed form against the model.
+
+    Raises:
+        ValueError: They differ.
+    """
+    q = closed_form.q_min + 0.37 * (closed_form.q_max - closed_form.q_min)
+    for field, ours, models in zip(
+        ArmPose._fields, closed_form.calc_pose(q), numerical.calc_pose(q), strict=True
+    ):
+        if not np.allclose(ours, models, atol=1e-6):
+            raise ValueError(
+                f"at q = {np.round(q, 3)} rad its {field} is {np.round(models, 4).tolist()}, where"
+                f" the closed form has {np.round(ours, 4).tolist()}"
+            )
+
+
+def _parse(plant: MultibodyPlant, model: str | Path) -> list[ModelInstanceIndex]:
+    if isinstance(model, Path):
+        return Parser(plant).AddModels(str(model))
+    return Parser(plant).AddModelsFromString(model, "urdf")
+
+
+def _add_carriage(plant: MultibodyPlant, arm: ModelInstanceIndex, frame: Frame) -> Frame:
+    """Adds bodies that slide along x, y and z; returns the frame that carries the arm."""
+    for axis, direction in zip("xyz", np.eye(3), strict=True):
+        body = plant.AddRigidBody(
+            f"base_{axis}", arm, SpatialInertia(1.0, np.zeros(3), UnitInertia.SolidSphere(0.1))
+        )
+        plant.AddJoint(PrismaticJoint(f"base_{axis}", frame, body.body_frame(), direction))
+        frame = body.body_frame()
+    if plant.geometry_source_is_registered():
+        X_BV = RigidTransform(np.array([-0.1, 0.0, 0.0]))
+        plant.RegisterVisualGeometry(body, X_BV, Box(0.2, 0.2, 0.02), "base_visual", _BASE_COLOR)
+    return frame
+
+
+def _hold_joints(
+    plant: MultibodyPlant, arm: ModelInstanceIndex, positions: Mapping[str, float]
+) -> None:
+    """Replaces joints by welds at positions, before the plant is finalized.
+
+    A frame with a joint's name is where the joint was, at its position. `Joint.Lock` would neither
+    work with an integrator's continuous plant nor save any time.
+    """
+    for actuator in map(plant.get_joint_actuator, plant.GetJointActuatorIndices()):
+        if actuator.model_instance() == arm and actuator.joint().name() in positions:
+            plant.RemoveJointActuator(actuator)
+    for name, position in positions.items():
+        joint = plant.GetJointByName(name, arm)
+        if isinstance(joint, PrismaticJoint):
+            X_PC = RigidTransform(position * joint.translation_axis())
+        elif isinstance(joint, RevoluteJoint):
+            X_PC = RigidTransform(RotationMatrix.MakeFromOneVector(joint.revolute_axis(), 2))
+            turn = RigidTransform(RotationMatrix.MakeZRotation(position))
+            X_PC = X_PC @ turn @ X_PC.inverse()
+        else:
+            raise ValueError(f"joint {name} is neither prismatic nor revolute")
+        parent, child = joint.frame_on_parent(), joint.frame_on_child()
+        plant.RemoveJoint(joint)
+        plant.WeldFrames(plant.AddFrame(FixedOffsetFrame(name, parent, X_PC, arm)), child)

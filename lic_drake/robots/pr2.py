@@ -1,31 +1,32 @@
 """The right arm of a PR2 whose base and torso stand still for the reach (paper IV-B, V)."""
 
-from collections.abc import Sequence
-from functools import cache, lru_cache
+from functools import cache
+from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
-from pydrake.common.eigen_geometry import Quaternion
-from pydrake.math import RotationMatrix
-from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import Frame, ModelInstanceIndex
 
 from lic_drake.errors import ScenarioError
-from lic_drake.robots.pr2_description import (
-    BASE_JOINTS,
-    LEFT_ARM_AT_REST,
-    SOFT_LIMITS,
-    TORSO_JOINT,
-    TORSO_RANGE_M,
-    add_pr2,
-    joint_names,
-    link_names,
-    read_pr2,
-    weld_joints,
-)
-from lic_drake.robots.pr2_inverse import calc_preselection_cost, solve_pose
-from lic_drake.robots.pr2_kinematics import Pr2Kinematics, calc_point_jacobians
+from lic_drake.paths import models_dir
+from lic_drake.robots.arm import Arm
+from lic_drake.robots.pr2_kinematics import Pr2Kinematics
 from lic_drake.types import Vector
+
+JOINTS = (
+    "shoulder_pan",
+    "shoulder_lift",
+    "upper_arm_roll",
+    "elbow_flex",
+    "forearm_roll",
+    "wrist_flex",
+    "wrist_roll",
+)
+"""The joints of an arm, without side and suffix; each moves a link of its name."""
+
+CARRIAGE = ("x", "y", "torso_lift_joint")
+"""Joints of the base, whose heading is held, and of the torso lift."""
+
+TORSO_RANGE_M = (0.0115, 0.305)
+"""Soft limits of the torso lift, metres (PR2/pr2_common, commit e1f9029, BSD)."""
 
 MPC_LIMITS_DEG = np.array(
     [
@@ -40,160 +41,75 @@ MPC_LIMITS_DEG = np.array(
 )
 """Joint limits of the controller (gt-ros-pkg/hrl-haptic-manip, facts only), mirrored to the right.
 
-They stop joints that could turn for ever, so that cables and a reach have an end.
+They give the continuous joints an end, as cables do.
 """
 
-HOME_DEG = np.array([-40.0, 20.0, -90.0, -90.0, 0.0, -45.0, 0.0])
-"""A posture of ours: elbow out to the side, hand before the body, nothing near a limit."""
+Q_HOME: Vector = np.deg2rad([-40.0, 20.0, -90.0, -90.0, 0.0, -45.0, 0.0])
+"""A posture of ours: elbow out to the side, hand before the body, nothing near a limit, radians."""
+
+LEFT_ARM_AT_REST = (1.8, 1.0, 1.2, -1.9, -0.5, -0.6, 0.0)
+"""Where we hold the left arm, radians: beside the body, out of the right arm's way."""
+
+RIGHT_ARM_AT_REST: Vector = np.array(LEFT_ARM_AT_REST) * [-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, 1.0]
+"""The same posture mirrored: beside the body, not before the camera, radians."""
+
+HEAD_CAMERA = "head_camera"
+"""Frame of the head's camera in models/pr2/pr2.urdf."""
+
+HEAD_TILT_RANGE_DEG = (-21.27, 74.27)
+"""Soft limits of the head's tilt, down positive (PR2/pr2_common, head.urdf.xacro, BSD)."""
+
+TILT_AXIS = (0.05093, 0.0, 0.38145)
+"""A point of the tilt axis, along y, in torso_lift_link, metres (same source)."""
 
 
-class Pr2Arm:
-    """Base and torso welded, joint impedance as implicit PD, gravity off; satisfies `Arm`.
-
-    Frame R is the frame to which the robot is added, on the floor: base_footprint if the base
-    pose is 0. Hand poses x0 are the tool frame's position and quaternion (w, x, y, z), shape (7,).
+def make_pr2(heading: float = 0.0, head_tilt_deg: float = 0.0) -> Arm:
+    """Returns the right arm of a PR2, with the rest of the robot.
 
     Args:
-        base_pose: Where the base stands in R: x, y (metres) and heading (radians).
-        torso_m: Height of the torso lift, metres.
-        mobile: Whether base and torso keep their joints in a plant, for a robot that moves between
-            reaches or looks for a place to reach from; nothing drives them.
+        heading: Of the base, held, radians.
+        head_tilt_deg: How far the head looks down, degrees.
 
     Raises:
-        ScenarioError: The torso cannot go there.
+        ScenarioError: The head cannot go there.
     """
-
-    name = "pr2"
-    torso_frame = TORSO_JOINT
-    link_names: tuple[str, ...] = link_names()
-
-    def __init__(
-        self,
-        base_pose: Sequence[float] = (0.0, 0.0, 0.0),
-        torso_m: float = TORSO_RANGE_M[0],
-        mobile: bool = False,
-    ) -> None:
-        if not TORSO_RANGE_M[0] <= torso_m <= TORSO_RANGE_M[1]:
-            raise ScenarioError(
-                "the PR2's torso_m must be from {} to {}, got {}".format(*TORSO_RANGE_M, torso_m)
-            )
-        x, y, theta = (float(value) for value in base_pose)
-        self.base_pose = (x, y, theta)
-        self.torso_m = torso_m
-        self.mobile = mobile
-        pr2 = read_pr2()
-        mpc_min, mpc_max = np.deg2rad(MPC_LIMITS_DEG).T
-        self.q_min: Vector = np.maximum(mpc_min, pr2.q_min)
-        self.q_max: Vector = np.minimum(mpc_max, pr2.q_max)
-        self.q_soft_min, self.q_soft_max = np.array(SOFT_LIMITS).T
-        self.q_home: Vector = np.deg2rad(HOME_DEG)
-        self.stiffness = pr2.stiffness
-        self.damping = pr2.damping
-        self.effort_limit = pr2.effort_limit
-        self.velocity_limit = pr2.velocity_limit
-        self.surface = pr2.surface
-        self.skin = tuple(shape.enclosing_capsule() for shape in pr2.surface)
-        p_RA = RotationMatrix.MakeZRotation(theta).matrix() @ pr2.p_FA + [x, y, torso_m]
-        self.kinematics = Pr2Kinematics(
-            yaw=theta, p_RA=p_RA, lengths=pr2.lengths, q_min=self.q_min, q_max=self.q_max
+    low, high = HEAD_TILT_RANGE_DEG
+    if not low <= head_tilt_deg <= high:
+        raise ScenarioError(
+            f"the PR2's head_tilt_deg must be from {low} to {high}, got {head_tilt_deg}"
         )
-        self.p_RS = p_RA
-        self.reach_m = self.kinematics.reach_m
-        # Sensor, controller and stop rules ask for the same configuration, one after the other.
-        self._pose = lru_cache(maxsize=1)(self.kinematics.calc_pose)
-
-    def add_to_plant(
-        self, plant: MultibodyPlant, parent: Frame | None = None
-    ) -> ModelInstanceIndex:
-        """Adds the robot without gravity, its floor frame R welded to a frame, else to the world.
-
-        Args:
-            plant: The plant, not yet finalized.
-            parent: The frame that becomes R.
-        """
-        pr2 = add_pr2(plant)
-        root = plant.GetFrameByName("base_link_for_rbt_compat", pr2)
-        plant.WeldFrames(parent or plant.world_frame(), root)
-        stand = dict(zip((*BASE_JOINTS, TORSO_JOINT), (*self.base_pose, self.torso_m), strict=True))
-        rest = dict(zip(joint_names("l"), LEFT_ARM_AT_REST, strict=True))
-        if self.mobile:
-            for name, position in stand.items():
-                plant.GetJointByName(name, pr2).set_default_positions(np.array([position]))
-            weld_joints(plant, pr2, rest)
-        else:
-            weld_joints(plant, pr2, stand | rest)
-        return pr2
-
-    def raised(self, torso_m: float) -> "Pr2Arm":
-        """Returns the arm of a robot that stands in the same place with its torso at a height.
-
-        Raises:
-            ScenarioError: The torso cannot go there.
-        """
-        return _standing(self.base_pose, torso_m)
-
-    def solve_ik(self, x0: Vector) -> Vector | None:
-        """Returns the configuration of least cost (Eq. 5) that brings the tool to x0, or None.
-
-        It may collide with the robot: `start_angles` gives all of them to choose from.
-
-        Args:
-            x0: Position and quaternion of the tool frame, shape (7,); of any positive norm.
-        """
-        q = self.start_angles(x0)
-        return q[0] if len(q) else None
-
-    def start_angles(self, x0: Vector) -> Vector:
-        """Returns the configurations that bring the tool to x0, shape (n, 7), by Eq. (5).
-
-        Args:
-            x0: As for `solve_ik`.
-        """
-        R_RE = RotationMatrix(Quaternion(x0[3:] / np.linalg.norm(x0[3:]))).matrix()
-        q = solve_pose(self.kinematics, x0[:3], R_RE)
-        cost = calc_preselection_cost(self.kinematics, q)
-        sorted_q: Vector = q[np.argsort(cost, kind="stable")]
-        return sorted_q
-
-    def tip_pose(self, q: Vector) -> Vector:
-        """Returns x0: p_RE and the quaternion of R_RE with w >= 0, shape (7,)."""
-        pose = self._pose(*q.tolist())
-        wxyz = RotationMatrix(pose.R_RL[6]).ToQuaternion().wxyz()
-        return np.concatenate((pose.p_RE, wxyz if wxyz[0] >= 0.0 else -wxyz))
-
-    def tip_position(self, q: Vector) -> Vector:
-        """Returns p_RE, shape (3,), metres."""
-        return self._pose(*q.tolist()).p_RE
-
-    def tip_rotation(self, q: Vector) -> Vector:
-        """Returns R_RE, shape (3, 3); the tool points along its first column."""
-        R_RE: Vector = self._pose(*q.tolist()).R_RL[6]
-        return R_RE
-
-    def tip_jacobian(self, q: Vector) -> Vector:
-        """Returns Jv_v_RE, shape (3, 7), m/rad."""
-        return self._pose(*q.tolist()).Jv_E
-
-    def tip_angular_jacobian(self, q: Vector) -> Vector:
-        """Returns Jv_w_RE, shape (3, 7)."""
-        return self._pose(*q.tolist()).Jw_E
-
-    def link_poses(self, q: Vector) -> tuple[Vector, Vector]:
-        """Returns R_RL, shape (7, 3, 3), and p_RL, shape (7, 3), metres."""
-        pose = self._pose(*q.tolist())
-        return pose.R_RL, pose.p_RL
-
-    def point_jacobians(self, q: Vector, links: NDArray[np.intp], p_RQ: Vector) -> Vector:
-        """Returns Jv_v_RQ of points on links, shape (n, 3, 7), m/rad."""
-        return calc_point_jacobians(self._pose(*q.tolist()), links, p_RQ)
+    mpc_min, mpc_max = np.deg2rad(MPC_LIMITS_DEG).T
+    left = (f"l_{joint}_joint" for joint in JOINTS)
+    return Arm(
+        "pr2",
+        _tilt_head(head_tilt_deg),
+        base_frame="base_link_for_rbt_compat",
+        tip_frame="r_gripper_tool_frame",
+        skin_links=[f"r_{joint}_link" for joint in JOINTS],
+        q_min=mpc_min,
+        q_max=mpc_max,
+        held={"theta": heading} | dict(zip(left, LEFT_ARM_AT_REST, strict=True)),
+        carriage=CARRIAGE,
+        height_range_m=TORSO_RANGE_M,
+        kinematics=None if heading else Pr2Kinematics,
+    )
 
 
 @cache
-def pr2_arm() -> Pr2Arm:
-    """Returns the arm of a robot that stands at the origin, its torso down; made once a process."""
-    return Pr2Arm()
+def pr2_arm() -> Arm:
+    """Returns the arm of a PR2 that heads for the clutter, made once a process."""
+    return make_pr2()
 
 
-@lru_cache(maxsize=64)
-def _standing(base_pose: tuple[float, float, float], torso_m: float) -> Pr2Arm:
-    return Pr2Arm(base_pose, torso_m)
+def _tilt_head(tilt_deg: float) -> str:
+    """Returns the model with the head, whose frame is the torso's at zero, tilted."""
+    robot = ElementTree.parse(models_dir() / "pr2" / "pr2.urdf").getroot()
+    ElementTree.register_namespace("drake", "http://drake.mit.edu")
+    tilt = np.deg2rad(tilt_deg)
+    x, _, z = TILT_AXIS
+    c, s = np.cos(tilt), np.sin(tilt)
+    origin = robot.find("joint[@name='head_joint']/origin")
+    assert origin is not None
+    origin.set("xyz", f"{x - c * x - s * z} 0 {z + s * x - c * z}")
+    origin.set("rpy", f"0 {tilt} 0")
+    return ElementTree.tostring(robot, encoding="unicode")

@@ -1,27 +1,39 @@
-"""Forward kinematics of the PR2's right arm, without Drake: it runs in the control loop.
+"""Kinematics of the PR2's right arm in closed form, without Drake: they run in the control loop.
 
-Frame R is where the robot is added to the world; base, torso and arm place the tool frame E in it.
 From the pan axis on the seven joints turn about z, y, x, y, x, y and x of the link they carry, and
 all offsets lie along x: pan axis to shoulder, shoulder to elbow, elbow to wrist, wrist to tool. At
 q = 0 the arm is straight.
+
+Inverse: given where the tool is and which way it points, the wrist is known, and the pan angle
+alone is free: the distance from shoulder to wrist gives the elbow, two upper arm rolls bring the
+wrist to the right side of the shoulder, the lift to the right height; forearm roll and wrist flex
+then point the tool. Elbow and wrist bend one way only, so every pan angle has at most two
+configurations, and a row of pan angles gives all families of them.
 """
 
 import math
-from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lic_drake.types import Vector
+from lic_drake.robots.kinematics import ArmGeometry, ArmPose, Kinematics, keep_limits, rigid_pose
+from lic_drake.types import IntVector, Vector
+
+NUM_PAN_ANGLES = 271
+"""Pan angles that are tried over the joint's range: one every half degree."""
+
+_SLACK = 1e-12
+"""Cosines and sines may be beyond 1 by this much: rounding must not refuse a straight arm."""
+
+_STRAIGHT = 1e-9
+"""A bend whose sine is below this leaves the roll before it undefined."""
+
+_X_R = np.array([1.0, 0.0, 0.0])
+"""The x of Eq. (5), from the robot to the clutter."""
 
 _Axis = tuple[float, float, float]
 
 _ZEROS = (0.0,) * 7
-
-_MOVES = np.tri(7)
-"""1 where a joint (column) moves a link (row)."""
 
 
 class ArmLengths(NamedTuple):
@@ -33,72 +45,45 @@ class ArmLengths(NamedTuple):
     tool: float
 
 
-class Pr2Pose(NamedTuple):
-    """Where the arm is at one configuration, with what its Jacobians are made of.
+class _Heading(NamedTuple):
+    """Where wrist and tool lie, seen from the shoulder behind each pan angle; shapes (n, 3)."""
+
+    p_SW: Vector
+    u_S: Vector
+
+
+class Pr2Kinematics(Kinematics):
+    """Closed forms of the seven joints.
 
     Attributes:
-        R_RL: Rotations of the seven links, shape (7, 3, 3); the last one is also R_RE.
-        p_RL: Their origins, shape (7, 3), metres.
-        p_RE: Position of the tool frame, shape (3,), metres.
-        Jv_E: Translational Jacobian of the tool frame's origin, shape (3, 7), m/rad.
-        Jw_E: Angular Jacobian, the joint axes, shape (3, 7).
-        turn: Matrix, shape (3, 21), with p_RQ @ turn = the axes' cross products with p_RQ.
-        moment: The same for a point of each axis itself, shape (3, 7), metres.
-    """
-
-    R_RL: Vector
-    p_RL: Vector
-    p_RE: Vector
-    Jv_E: Vector
-    Jw_E: Vector
-    turn: Vector
-    moment: Vector
-
-
-@dataclass(frozen=True, kw_only=True)
-class Pr2Kinematics:
-    """Lengths and joint limits of the arm, and where its base stands.
-
-    Attributes:
-        yaw: Heading of the base in R, radians.
         p_RA: Position of the pan axis at the height of the arm, shape (3,), metres.
         lengths: Distances along the arm.
-        q_min: Lower joint limits, shape (7,), radians.
-        q_max: Upper joint limits, shape (7,), radians.
     """
 
-    yaw: float
-    p_RA: Vector
-    lengths: ArmLengths
-    q_min: Vector
-    q_max: Vector
+    def __init__(self, arm: ArmGeometry) -> None:
+        super().__init__(arm)
+        if len(arm.q_min) != 7:
+            raise ValueError(f"it has {len(arm.q_min)} degrees of freedom, not 7")
+        self.p_RA = arm.p_RJ[0]
+        steps = np.diff(arm.p_RJ[[0, 1, 3, 5, 7]], axis=0)
+        self.lengths = ArmLengths(*np.linalg.norm(steps, axis=1).tolist())
 
-    @cached_property
-    def reach_m(self) -> float:
-        """Bound of the tip's distance from the pan axis: the straight arm."""
-        return sum(self.lengths)
-
-    def within_limits(self, q: Vector, tolerance: float = 1e-9) -> bool:
-        """Tells whether q keeps all joint limits, to a tolerance in radians."""
-        return bool(np.all(q >= self.q_min - tolerance) and np.all(q <= self.q_max + tolerance))
-
-    def calc_pose(self, *q: float) -> Pr2Pose:
+    def calc_pose(self, q: Vector) -> ArmPose:
         """Returns the arm's pose at seven joint angles, radians.
 
         Scalars, because numpy takes longer to start than these few numbers need.
         """
-        pan, lift, upper_arm_roll, elbow, forearm_roll, wrist, wrist_roll = q
+        pan, lift, upper_arm_roll, elbow, forearm_roll, wrist, wrist_roll = q.tolist()
         shoulder_m, upper_arm_m, forearm_m, tool_m = self.lengths
-        heading = self.yaw + pan
-        x1: _Axis = (math.cos(heading), math.sin(heading), 0.0)
+        x1: _Axis = (math.cos(pan), math.sin(pan), 0.0)
         y1: _Axis = (-x1[1], x1[0], 0.0)
         z1: _Axis = (0.0, 0.0, 1.0)
-        z2, x2 = _turn(z1, x1, lift)
-        y3, z3 = _turn(y1, z2, upper_arm_roll)
-        z4, x4 = _turn(z3, x2, elbow)
-        y5, z5 = _turn(y3, z4, forearm_roll)
-        z6, x6 = _turn(z5, x4, wrist)
-        y7, z7 = _turn(y5, z6, wrist_roll)
+        z2, x2 = _turn_axes(z1, x1, lift)
+        y3, z3 = _turn_axes(y1, z2, upper_arm_roll)
+        z4, x4 = _turn_axes(z3, x2, elbow)
+        y5, z5 = _turn_axes(y3, z4, forearm_roll)
+        z6, x6 = _turn_axes(z5, x4, wrist)
+        y7, z7 = _turn_axes(y5, z6, wrist_roll)
 
         p1: _Axis = tuple(self.p_RA.tolist())
         p2 = _step(p1, x1, shoulder_m)
@@ -139,31 +124,173 @@ class Pr2Kinematics:
         )
         Jv_E = (p_RE @ turn).reshape(3, 7) - moment
         Jv_E.flags.writeable = False
-        return Pr2Pose(
-            R_RL=numbers[:63].reshape(7, 3, 3).swapaxes(1, 2),
+        R_RL = numbers[:63].reshape(7, 3, 3).swapaxes(1, 2)
+        return ArmPose(
+            R_RL=R_RL,
             p_RL=numbers[63:84].reshape(7, 3),
             p_RE=p_RE,
+            R_RE=R_RL[6],
             Jv_E=Jv_E,
             Jw_E=numbers[87:108].reshape(3, 7),
             turn=turn,
             moment=moment,
         )
 
+    def solve_ik(self, x0: Vector, near: Vector | None = None) -> Vector:
+        """Returns configurations for a tool pose, shape (n, 7); see `Kinematics.solve_ik`.
 
-def calc_point_jacobians(pose: Pr2Pose, links: NDArray[np.intp], p_RQ: Vector) -> Vector:
-    """Returns Jv_v_RQ of points on links, shape (n, 3, 7), m/rad.
+        Without `near` pan angles are tried over the joint's range; with it only its own.
+        """
+        q = self.solve_pose(*rigid_pose(x0), None if near is None else near[:1])
+        if near is None:
+            order = self.calc_preselection_cost(q)
+        else:
+            turned = q + 2.0 * np.pi * np.round((near - q) / (2.0 * np.pi))
+            q = np.where((turned >= self.q_min) & (turned <= self.q_max), turned, q)
+            order = np.linalg.norm(q - near, axis=1)
+        return q[np.argsort(order, kind="stable")]
 
-    Args:
-        pose: The arm's pose.
-        links: Index of the link of each point, 0 to 6, shape (n,); joints beyond it do not count.
-        p_RQ: Positions of the points, shape (n, 3), metres.
+    def solve_pose(self, p_RE: Vector, R_RE: Vector, pan: Vector | None = None) -> Vector:
+        """Returns all configurations for a tool pose, shape (n, 7), ordered by pan angle.
+
+        Args:
+            p_RE: Position of the tool frame, shape (3,), metres.
+            R_RE: Its rotation, shape (3, 3).
+            pan: Pan angles to try, shape (k,), radians; by default a row over the joint's range.
+
+        Returns:
+            Angles within the limits; those of continuous joints are in [-pi, pi).
+        """
+        q, _ = self.solve_at(p_RE, R_RE[:, 0], self._pan_angles if pan is None else pan)
+        for row in q:
+            y_6 = self.calc_pose(row).R_RL[5].T @ R_RE[:, 1]
+            row[6] = _wrap(np.arctan2(y_6[2], y_6[1]))
+        return keep_limits(q, self.q_min, self.q_max)[0]
+
+    def solve_pointing(self, p_RE: Vector, u_R: Vector) -> list[Vector]:
+        """Returns configurations with the tool at places and pointing one way, k times (n, 7).
+
+        See `Kinematics.solve_pointing`. The wrist roll, which changes neither, is 0: the middle of
+        its range.
+        """
+        pan = self._pan_angles
+        q, sample = self.solve_at(np.repeat(p_RE, len(pan), axis=0), u_R, np.tile(pan, len(p_RE)))
+        each = np.split(q, np.searchsorted(sample, len(pan) * np.arange(1, len(p_RE))))
+        return [row[np.argsort(self.calc_preselection_cost(row), kind="stable")] for row in each]
+
+    @property
+    def _pan_angles(self) -> Vector:
+        return np.linspace(self.q_min[0], self.q_max[0], NUM_PAN_ANGLES)
+
+    def solve_at(self, p_RE: Vector, u_R: Vector, pan: Vector) -> tuple[Vector, IntVector]:
+        """Returns configurations that point, and the index of each one's pan angle, shape (n,).
+
+        Args:
+            p_RE: Position of the tool, shape (3,), or one for each pan angle, shape (k, 3), metres.
+            u_R: Unit vector along which the tool points, shape (3,).
+            pan: Pan angles to try, shape (k,), radians.
+        """
+        heading = self._look_from_shoulder(p_RE, u_R, pan)
+        _, upper_arm, forearm, _ = self.lengths
+        cos_elbow = (np.sum(heading.p_SW**2, axis=1) - upper_arm**2 - forearm**2) / (
+            2.0 * upper_arm * forearm
+        )
+        elbow = -np.arccos(np.clip(cos_elbow, -1.0, 1.0))
+        # The wrist in the upper arm's frame: along its x axis, and to the side.
+        along = upper_arm + forearm * np.cos(elbow)
+        aside = -forearm * np.sin(elbow)
+        is_bent = aside > _STRAIGHT
+        sin_roll = np.where(is_bent, -heading.p_SW[:, 1], 0.0) / np.where(is_bent, aside, 1.0)
+        reaches = (np.abs(cos_elbow) <= 1.0 + _SLACK) & (np.abs(sin_roll) <= 1.0 + _SLACK)
+        reaches &= is_bent | (np.abs(heading.p_SW[:, 1]) <= _STRAIGHT)
+        # What follows is only worked out where the arm is long enough.
+        heading = _Heading(heading.p_SW[reaches], heading.u_S[reaches])
+        pan, elbow, along, aside = (v[reaches] for v in (pan, elbow, along, aside))
+        roll = np.arcsin(np.clip(sin_roll[reaches], -1.0, 1.0))
+        branches = [
+            _complete(heading, pan, roll, elbow, along, aside),
+            _complete(heading, pan, np.pi - roll, elbow, along, aside),
+        ]
+        q = np.stack(branches, axis=1).reshape(-1, 7)
+        # The roll's range is less than a turn, but does not lie about 0.
+        q[:, 2] = self.q_min[2] + np.mod(q[:, 2] - self.q_min[2], 2.0 * np.pi)
+        kept, legal = keep_limits(q, self.q_min, self.q_max)
+        return kept, np.repeat(np.flatnonzero(reaches), 2)[legal]
+
+    def calc_preselection_cost(self, q: Vector, alpha: float = 1.0, beta: float = 1.0) -> Vector:
+        """Returns the cost of Eq. (5), shape (n,), 1/m: low when hand and forearm point inward.
+
+        C = 1 / (alpha |x'p_tw| + beta |x'p_te|), p_tw and p_te from the tool to wrist and elbow.
+
+        Args:
+            q: Configurations, shape (n, 7), radians.
+            alpha: Weight of the wrist, positive (the paper does not give it).
+            beta: Weight of the elbow, positive (the paper does not give it).
+        """
+        pan, lift, upper_arm_roll, elbow, forearm_roll, wrist, _ = q.T[..., None]
+        zero = np.zeros_like(pan)
+        x, y = (
+            np.hstack([np.cos(pan), np.sin(pan), zero]),
+            np.hstack([-np.sin(pan), np.cos(pan), zero]),
+        )
+        z: Vector = np.broadcast_to([0.0, 0.0, 1.0], x.shape)
+        z, upper_arm = _turn(z, x, lift)
+        y, z = _turn(y, z, upper_arm_roll)
+        z, forearm = _turn(z, upper_arm, elbow)
+        y, z = _turn(y, z, forearm_roll)
+        _, tool = _turn(z, forearm, wrist)
+        wrist_to_tool = self.lengths.tool * (tool @ _X_R)
+        elbow_to_tool = wrist_to_tool + self.lengths.forearm * (forearm @ _X_R)
+        cost: Vector = 1.0 / (alpha * np.abs(wrist_to_tool) + beta * np.abs(elbow_to_tool))
+        return cost
+
+    def _look_from_shoulder(self, p_RE: Vector, u_R: Vector, pan: Vector) -> _Heading:
+        """Returns wrist and direction in the frame of the pan link, moved to the shoulder."""
+        p_AW = p_RE - self.lengths.tool * u_R - self.p_RA
+        c, s = np.cos(pan), np.sin(pan)
+        p_SW, u_S = (
+            np.column_stack([c * x + s * y, c * y - s * x, z])
+            for x, y, z in (np.broadcast_to(v, (len(pan), 3)).T for v in (p_AW, u_R))
+        )
+        p_SW[:, 0] -= self.lengths.shoulder
+        return _Heading(p_SW, u_S)
+
+
+def _complete(
+    heading: _Heading, pan: Vector, roll: Vector, elbow: Vector, along: Vector, aside: Vector
+) -> Vector:
+    """Returns the configurations of one upper arm roll a pan angle, shape (n, 7)."""
+    x, _, z = heading.p_SW.T
+    up = aside * np.cos(roll)
+    lift = np.arctan2(up * x - along * z, along * x + up * z)
+    ux, uy, uz = heading.u_S.T
+    uz, ux = _turn(uz, ux, lift)
+    uy, uz = _turn(uy, uz, roll)
+    uz, ux = _turn(uz, ux, elbow)
+    bend = np.hypot(uy, uz)
+    wrist = -np.arctan2(bend, ux)
+    forearm_roll = np.where(bend > _STRAIGHT, _wrap(np.arctan2(-uy, uz)), 0.0)
+    return np.column_stack(
+        [pan, lift, roll, elbow, forearm_roll, wrist, np.zeros_like(pan)],
+    )
+
+
+def _turn(u: Vector, v: Vector, angle: Vector) -> tuple[Vector, Vector]:
+    """Returns axes u and v after they have turned from u to v.
+
+    Components along two axes that turn the other way change alike.
     """
-    jacobians: Vector = (p_RQ @ pose.turn).reshape(-1, 3, 7) - pose.moment
-    jacobians *= _MOVES[links][:, None]
-    return jacobians
+    c, s = np.cos(angle), np.sin(angle)
+    return c * u + s * v, c * v - s * u
 
 
-def _turn(u: _Axis, v: _Axis, angle: float) -> tuple[_Axis, _Axis]:
+def _wrap(angle: Vector) -> Vector:
+    """Returns angles wrapped to [-pi, pi), radians."""
+    wrapped: Vector = np.mod(angle + np.pi, 2.0 * np.pi) - np.pi
+    return wrapped
+
+
+def _turn_axes(u: _Axis, v: _Axis, angle: float) -> tuple[_Axis, _Axis]:
     """Returns the axes u and v of a frame that has turned about the third one, from u to v."""
     c, s = math.cos(angle), math.sin(angle)
     u1, u2, u3 = u

@@ -14,7 +14,7 @@ from lic_drake.types import Vector
 
 
 def is_touching(scene: Scene, root: Context) -> bool:
-    """Tells whether the arm touches anything, in a context of the diagram that has the scene."""
+    """Returns whether the arm touches anything, in a context of the diagram that has the scene."""
     query = cast(
         QueryObject,
         scene.scene_graph.get_query_output_port().Eval(
@@ -29,35 +29,43 @@ def is_touching(scene: Scene, root: Context) -> bool:
 
 
 class CollisionChecker:
-    """A robot before the fixed objects of an environment, which are all that it can know of it.
+    """A mobile robot in front of the fixed objects of an environment, all that it can see of it.
 
     Args:
         arm: The arm with the robot that carries it.
-        instance: The environment in the robot's frame.
+        instance: The environment in W.
         config: Gives the contact properties.
 
     Attributes:
-        plant: Robot and objects; its geometry knows only pairs with the arm.
+        plant: Robot and objects, with the positions of `Arm.positions`; its geometry has only pairs
+            with the arm.
         plant_context: Its context, in which `touches` sets positions.
     """
 
     def __init__(self, arm: Arm, instance: ClutterInstance, config: SceneConfig) -> None:
+        self._arm = arm
         builder = DiagramBuilder()
-        self._scene = add_scene(builder, arm, _fixed_part(instance), config)
+        self._scene = add_scene(builder, arm, _fixed_part(instance), config, mobile=True)
         self._forget_pairs_without_the_arm()
         self._diagram = builder.Build()
         self._root = self._diagram.CreateDefaultContext()
         self.plant = self._scene.plant
         self.plant_context = self.plant.GetMyMutableContextFromRoot(self._root)
 
-    def touches(self, q: Vector) -> bool:
-        """Tells whether the arm touches anything at positions q of the robot's joints.
+    def touches(self, b0: Vector, q: Vector) -> bool:
+        """Returns whether the arm touches anything.
 
         Args:
-            q: Joint angles, shape (m,), radians; for a mobile robot those of all its joints.
+            b0: Position of R, shape (3,), metres.
+            q: Joint angles, shape (m,), radians.
         """
-        self.plant.SetPositions(self.plant_context, self._scene.arm, q)
+        positions = self._arm.positions(b0, q)
+        self.plant.SetPositions(self.plant_context, self._scene.arm, positions)
         return is_touching(self._scene, self._root)
+
+    def first_free(self, b0: Vector, angles: Vector) -> Vector | None:
+        """Returns the first of joint angles, shape (n, m), with which the arm touches nothing."""
+        return next((q for q in angles if not self.touches(b0, q)), None)
 
     def _forget_pairs_without_the_arm(self) -> None:
         """Board and the rest of the robot may be as near to each other as they like."""

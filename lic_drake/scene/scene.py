@@ -16,7 +16,6 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
 from pydrake.multibody.tree import (
-    FixedOffsetFrame,
     ModelInstanceIndex,
     RigidBody,
     SpatialInertia,
@@ -34,9 +33,6 @@ from lic_drake.scene.looks import object_color
 from lic_drake.scene.movables import add_floating_body, add_sliding_body
 from lic_drake.scene.stems import add_stems
 from lic_drake.types import Vector
-
-MOUNT_FRAME = "mount"
-"""Frame that carries a placeable robot; see `lic_drake.scene.furnish.place_robot`."""
 
 TIME_STEP_RANGE_S = (1e-5, 0.1)
 """Shortest and longest step of a discrete plant."""
@@ -96,12 +92,12 @@ class Scene:
     Attributes:
         plant: The finalized plant.
         scene_graph: Its scene graph.
-        arm: Model instance of the arm.
+        arm: Its model instance.
         clutter: Model instance of the movable objects.
         skin_links: Skin geometry -> index into the arm's link names.
         body: Collision geometry of the rest of the robot, which has no skin.
         objects: Collision geometry of each object of the instance.
-        torso_frame: Frame that carries the robot's torso; empty if it has none.
+        robot: The arm.
         num_axes: In how many directions its movable objects move, or its stems bend.
     """
 
@@ -112,7 +108,7 @@ class Scene:
     skin_links: dict[GeometryId, int]
     body: tuple[GeometryId, ...]
     objects: tuple[GeometryId, ...]
-    torso_frame: str
+    robot: Arm
     num_axes: int
 
 
@@ -122,7 +118,8 @@ def add_scene(
     instance: ClutterInstance,
     config: SceneConfig,
     visuals: bool = False,
-    placeable: bool = False,
+    mobile: bool = False,
+    height_m: float = 0.0,
 ) -> Scene:
     """Adds a plant with the arm and the clutter, and its scene graph, to a builder.
 
@@ -130,7 +127,7 @@ def add_scene(
     of the authors' planar objects is larger than any contact torque, so they never spin. See
     `lic_drake.scene.movables` for what resists them. Stems bend at their roots. Unless `visuals`,
     the objects cannot be seen, which saves a quarter of the time that building takes. With
-    `placeable` the robot can be moved by `lic_drake.scene.furnish.place_robot`, for pictures.
+    `mobile` the robot has the positions of `Arm.positions`; for `height_m` see `Arm.add_to_plant`.
     """
     plant, scene_graph = AddMultibodyPlant(
         MultibodyPlantConfig(
@@ -142,8 +139,7 @@ def add_scene(
         builder,
     )
     plant.mutable_gravity_field().set_gravity_vector(np.zeros(3))
-    mount = FixedOffsetFrame(MOUNT_FRAME, plant.world_frame(), RigidTransform())
-    arm_instance = arm.add_to_plant(plant, plant.AddFrame(mount) if placeable else None)
+    arm_instance = arm.add_to_plant(plant, mobile=mobile, height_m=height_m)
     skin_links = _wear_skin(plant, scene_graph, arm, arm_instance, config.contact)
     clutter = plant.AddModelInstance("clutter")
     objects: list[GeometryId] = []
@@ -187,7 +183,7 @@ def add_scene(
         skin_links=skin_links,
         body=_find_body(plant, arm_instance, skin_links),
         objects=tuple(objects),
-        torso_frame=arm.torso_frame,
+        robot=arm,
         num_axes=instance.num_axes,
     )
 

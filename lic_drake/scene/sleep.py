@@ -71,18 +71,19 @@ class SkinAxes:
 
     def __init__(self, arm: Arm, num_axes: int = 2) -> None:
         self._num_axes = num_axes
-        half = np.array([0.5 * c.length * c.R_LC[:, 2] for c in arm.skin])
-        centre = np.array([c.p_LC for c in arm.skin])
+        capsules = [shape.enclosing_capsule() for shape in arm.skin]
+        half = np.array([0.5 * c.size[1] * c.R_LS[:, 2] for c in capsules])
+        centre = np.array([c.p_LS for c in capsules])
         self._arm = arm
-        self._link = np.array([arm.link_names.index(c.link) for c in arm.skin])
+        self._link = np.array([arm.link_names.index(c.link) for c in capsules])
         self._p_LA = np.stack([centre - half, centre + half], axis=-1)
-        self._radius = np.array([c.radius for c in arm.skin])[:, np.newaxis]
+        self._radius = np.array([c.size[0] for c in capsules])[:, np.newaxis]
 
     def ends(self, q: Vector) -> Vector:
         """Returns the ends of the axes, shape (capsules, num_axes, 2): x, y, .. of both, metres."""
-        R_WL, p_WL = self._arm.link_poses(q)
+        pose = self._arm.calc_pose(q)
         d = self._num_axes
-        ends: Vector = R_WL[self._link, :d] @ self._p_LA + p_WL[self._link, :d, np.newaxis]
+        ends: Vector = pose.R_RL[self._link, :d] @ self._p_LA + pose.p_RL[self._link, :d, None]
         return ends
 
     def gaps(self, ends: Vector, p_WO: Vector) -> Vector:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from lic_drake.errors import RequestError
+from lic_drake.reach.pointing_starts import PointingStarts
 from lic_drake.reach.start import IN_PLANE, Start, Starts
 from lic_drake.select.situation import Selection, Situation
 from lic_drake.types import Vector
@@ -93,13 +94,12 @@ class CostSelector:
     the aperture, and COST came to 9 % of the goals instead of 31 %.
 
     Attributes:
-        p_RS: The shoulder about which the arm turns, in the robot's frame with the torso at 0,
-            shape (3,), metres.
-        b0: Where base and torso are, shape (3,), metres; None for an arm in the plane.
+        p_RS: The shoulder about which the arm turns, shape (3,), metres.
+        stays: Whether base and torso move as little as they can.
     """
 
     p_RS: Vector = field(default_factory=lambda: np.zeros(3))
-    b0: Vector | None = None
+    stays: bool = False
     method: str = "cost"
 
     def select(self, situation: Situation) -> Selection:
@@ -109,10 +109,12 @@ class CostSelector:
         if len(choices) == 0:
             raise RequestError("no discrete start is left away from the failed ones")
         cost = corridor_cost(choices.x0, situation.p_WG)
-        if self.b0 is None:
+        if not self.stays:
             second = np.abs((choices.b0 + self.p_RS - situation.p_WG)[:, 1])
         else:
-            second = np.linalg.norm(choices.b0 - self.b0, axis=1)
+            assert isinstance(situation.starts, PointingStarts)
+            torso_m = situation.starts.scenario.task.torso_m
+            second = np.linalg.norm(choices.b0 - [0.0, 0.0, torso_m], axis=1)
         # Rounded: equal poses have equal costs but for the last digits.
         i = int(np.lexsort([second, np.round(cost, 9)])[0])
         return make_selection(situation, choices, i, None, self.method, began)

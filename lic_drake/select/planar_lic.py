@@ -7,7 +7,7 @@ from scipy.optimize import minimize
 
 from lic_drake.reach.start import Starts
 from lic_drake.reach.starts import Region, find_region, is_possible
-from lic_drake.robots.planar import PlanarArm
+from lic_drake.robots.arm import Arm
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.objective import SuccessModel, SuccessObjective
 from lic_drake.select.planar_program import PlanarProgram
@@ -23,7 +23,7 @@ class PlanarLic(LicSelector):
 
     def __init__(
         self,
-        arm: PlanarArm,
+        arm: Arm,
         first: SuccessModel,
         second: SuccessModel | None = None,
         method: str = "lic",
@@ -64,9 +64,9 @@ class PlanarLic(LicSelector):
         region = find_region(regions, x0, p_WR)
         q = self._arm.solve_ik(x0 - [*p_WR, 0.0])
         # A candidate just beside the end of a region is one that nothing can improve.
-        if q is None or region is None:
+        if not len(q) or region is None:
             return None
-        x0, p_WR = self._program.solve(objective, region, x0, p_WR, q)
+        x0, p_WR = self._program.solve(objective, region, x0, p_WR, q[0])
         x0 = np.clip(x0, region.lower, region.upper)
         p_WR = np.clip(p_WR, region.base_lower, region.base_upper)
         if not is_possible(situation.planar_starts, x0, p_WR):

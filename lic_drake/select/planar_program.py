@@ -6,7 +6,7 @@ from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, ExtractValue, Ini
 from pydrake.solvers import MathematicalProgram, NloptSolver, SolverOptions
 
 from lic_drake.reach.starts import Region
-from lic_drake.robots.planar_kinematics import PlanarArmKinematics
+from lic_drake.robots.kinematics import Kinematics
 from lic_drake.select.objective import SuccessObjective
 from lic_drake.types import Vector
 from lic_drake.weak_method import weakly
@@ -26,7 +26,7 @@ class PlanarProgram:
     position of x0.
     """
 
-    def __init__(self, kinematics: PlanarArmKinematics) -> None:
+    def __init__(self, kinematics: Kinematics) -> None:
         self._kinematics = kinematics
         self._objective: SuccessObjective | None = None
         self.program = MathematicalProgram()
@@ -84,7 +84,9 @@ class PlanarProgram:
         error = self._kinematics.tip_pose(q) + np.append(b0, 0.0) - x0
         if x0_b0_q.dtype != object:
             return error
-        jacobian = np.hstack([-np.eye(3), np.eye(3, 2), self._kinematics.tip_pose_jacobian(q)])
+        pose = self._kinematics.calc_pose(q)
+        J = np.vstack([pose.Jv_E[:2], pose.Jw_E[2]])
+        jacobian = np.hstack([-np.eye(3), np.eye(3, 2), J])
         return InitializeAutoDiff(error, jacobian @ ExtractGradient(x0_b0_q))
 
 

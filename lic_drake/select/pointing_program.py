@@ -7,7 +7,6 @@ from pydrake.multibody.inverse_kinematics import MinimumDistanceLowerBoundConstr
 from pydrake.solvers import MathematicalProgram, SnoptSolver, SolverOptions
 
 from lic_drake.reach.pointing_starts import PointingStarts
-from lic_drake.robots.pr2 import Pr2Arm
 from lic_drake.select.objective import SuccessObjective
 from lic_drake.types import Vector
 from lic_drake.weak_method import weakly
@@ -22,8 +21,8 @@ INFLUENCE_M = 0.02
 class PointingProgram:
     """Maximise F(T_b0(s), x0) over base, torso and arm, the tool in the centre of an aperture.
 
-    Decision variables are the positions of all joints of the mobile robot: those of the base (x, y
-    and theta, of which y is free), the height of the torso, and the seven joint angles q:
+    Decision variables are b0, the base's position, of which y is free, and the height of the torso,
+    and the joint angles q:
 
         max F(T_b0(s), x0)  subject to  b0 + FK(q) = p_WA,  x of the tool = x of W,
         q_min <= q <= q_max,  y and torso in their ranges,  distance(arm, board or body) >= 1 mm.
@@ -33,16 +32,16 @@ class PointingProgram:
 
     def __init__(self, starts: PointingStarts) -> None:
         stand = starts.stand
-        self._arm = Pr2Arm()
+        self._arm = starts.scenario.arm()
         self._objective: SuccessObjective | None = None
         self._p_WA = np.zeros(3)
         self.program = MathematicalProgram()
-        self.b0 = self.program.NewContinuousVariables(4, "b0")
+        self.b0 = self.program.NewContinuousVariables(3, "b0")
         self.q = self.program.NewContinuousVariables(7, "q")
         everything = self.program.decision_variables()
         self.program.AddBoundingBoxConstraint(
-            np.array([0.0, stand.y_min_m, 0.0, stand.torso_min_m]),
-            np.array([0.0, stand.y_max_m, 0.0, stand.torso_max_m]),
+            np.array([0.0, stand.y_min_m, stand.torso_min_m]),
+            np.array([0.0, stand.y_max_m, stand.torso_max_m]),
             self.b0,
         )
         self.program.AddBoundingBoxConstraint(self._arm.q_min, self._arm.q_max, self.q)
@@ -75,39 +74,40 @@ class PointingProgram:
             q: Joint angles to begin with, shape (7,), radians.
         """
         self._objective, self._p_WA = objective, p_WA
-        guess = np.concatenate([[b0[0], b0[1], 0.0, b0[2]], q])
+        guess = np.concatenate([b0, q])
         result = self._solver.Solve(self.program, guess, self._options)
-        x, y, _, torso_m = result.GetSolution(self.b0)
-        return np.array([x, y, torso_m]), np.asarray(result.GetSolution(self.q))
+        return np.asarray(result.GetSolution(self.b0)), np.asarray(result.GetSolution(self.q))
 
     def _cost(self, positions: NDArray[np.generic]) -> object:
         """Evaluates -F for numbers and for AutoDiffXd."""
         assert self._objective is not None
         values = _values(positions)
-        b0, q = values[[0, 1, 3]], values[4:]
+        b0, q = values[:3], values[3:]
         x0 = self.tool_pose(b0, q)
         value, by_x0, by_b0 = self._objective.value_and_gradient(x0, b0)
         if positions.dtype != object:
             return -value
-        gradient = np.zeros(11)
-        gradient[[0, 1, 3]] = by_x0[:3] + by_b0
-        gradient[4:] = by_x0[:3] @ self._arm.tip_jacobian(q)
-        gradient[4:] += by_x0[3:] @ _quaternion_rates(x0[3:]) @ self._arm.tip_angular_jacobian(q)
+        pose = self._arm.calc_pose(q)
+        gradient = np.zeros(10)
+        gradient[:3] = by_x0[:3] + by_b0
+        gradient[3:] = by_x0[:3] @ pose.Jv_E
+        gradient[3:] += by_x0[3:] @ _quaternion_rates(x0[3:]) @ pose.Jw_E
         return AutoDiffXd(-value, -gradient @ ExtractGradient(positions))
 
     def _tool_error(self, positions: NDArray[np.generic]) -> object:
         """Evaluates how far the tool is from the centre and how much it points aside."""
         values = _values(positions)
-        b0, q = values[[0, 1, 3]], values[4:]
-        aim = self._arm.tip_rotation(q)[:, 0]
+        b0, q = values[:3], values[3:]
+        pose = self._arm.calc_pose(q)
+        aim = pose.R_RE[:, 0]
         error = np.concatenate([self.tool_pose(b0, q)[:3] - self._p_WA, aim[1:]])
         if positions.dtype != object:
             return error
-        jacobian = np.zeros((5, 11))
-        jacobian[:3, [0, 1, 3]] = np.eye(3)
-        jacobian[:3, 4:] = self._arm.tip_jacobian(q)
+        jacobian = np.zeros((5, 10))
+        jacobian[:3, :3] = np.eye(3)
+        jacobian[:3, 3:] = pose.Jv_E
         # The rate of a vector that turns with w is w x aim.
-        jacobian[3:, 4:] = -_cross_matrix(aim)[1:] @ self._arm.tip_angular_jacobian(q)
+        jacobian[3:, 3:] = -_cross_matrix(aim)[1:] @ pose.Jw_E
         return InitializeAutoDiff(error, jacobian @ ExtractGradient(positions))
 
     def tool_pose(self, b0: Vector, q: Vector) -> Vector:
@@ -118,7 +118,7 @@ class PointingProgram:
             q: Joint angles, shape (7,), radians.
         """
         x0 = self._arm.tip_pose(q)
-        x0[:3] += b0 - [0.0, 0.0, self._arm.torso_m]
+        x0[:3] += b0
         return x0
 
 

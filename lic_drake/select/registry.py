@@ -12,8 +12,6 @@ from lic_drake.estimate.features import FeatureMap, features_of
 from lic_drake.estimate.registry import estimator_names, make_estimator
 from lic_drake.experience.pairs import pair_reaches
 from lic_drake.robots.arm import Arm
-from lic_drake.robots.planar import PlanarArm
-from lic_drake.robots.pr2 import Pr2Arm
 from lic_drake.select.baselines import CostSelector, RandomSelector
 from lic_drake.select.objective import SuccessModel
 from lic_drake.select.planar_lic import PlanarLic
@@ -122,8 +120,7 @@ def make_selector(
         rng = np.random.default_rng(0) if rng is None else rng
         if method == "rnd":
             return RandomSelector(rng=rng)
-        moves = isinstance(arm, Pr2Arm)
-        return CostSelector(p_RS=arm.p_RS, b0=np.array([0.0, 0.0, arm.torso_m]) if moves else None)
+        return CostSelector(p_RS=arm.p_RS, stays=not arm.is_planar)
     if columns is None:
         raise RequestError(f"method {method!r} needs an experience library to learn from")
     features, only_first = features_of(category), method not in estimator_names()
@@ -137,11 +134,9 @@ def make_selector(
         pairs = pair_reaches(columns) if pairs is None else pairs
         second = fit_model(estimator, features.second, pairs)
     first_model = fit_model(estimator, features.first, columns)
-    if isinstance(arm, PlanarArm):
+    if arm.is_planar:
         return PlanarLic(arm, first_model, second, method=method)
-    if isinstance(arm, Pr2Arm):
-        return PointingLic(first_model, second, method=method)
-    raise RequestError(f"no selection is known for the robot {arm.name!r}")
+    return PointingLic(first_model, second, method=method)
 
 
 def fit_model(

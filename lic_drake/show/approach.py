@@ -3,9 +3,7 @@
 import numpy as np
 
 from lic_drake.clutter.instance import ClutterInstance
-from lic_drake.reach.pointing_starts import mobile_positions
 from lic_drake.reach.scenario import Scenario
-from lic_drake.robots.pr2 import Pr2Arm
 from lic_drake.scene.collision import CollisionChecker
 from lic_drake.seeds import make_generator
 from lic_drake.types import Vector
@@ -44,8 +42,8 @@ class Approach:
             instance: The environment.
         """
         self.waiting = np.deg2rad(WAITING_DEG)
-        self._arm = Pr2Arm()
-        self._checker = CollisionChecker(Pr2Arm(mobile=True), instance, scenario.scene)
+        self._arm = scenario.arm()
+        self._checker = CollisionChecker(self._arm, instance, scenario.scene)
 
     def path(self, b0: Vector, q_start: Vector) -> Vector:
         """Returns a path from the waiting posture to a start, shape (k, 7), radians.
@@ -72,12 +70,13 @@ class Approach:
         """Returns whether the arm touches nothing on a straight line in joint space."""
         steps = max(1, int(np.ceil(np.abs(q_to - q_from).max() / CHECKED_RAD)))
         line = q_to + np.linspace(0.0, 1.0, steps + 1)[:-1, np.newaxis] * (q_from - q_to)
-        return not any(self._checker.touches(q) for q in mobile_positions(b0, line))
+        return not any(self._checker.touches(b0, q) for q in line)
 
     def _retreat(self, b0: Vector, q_start: Vector) -> Vector:
         """Returns joint angles that draw the tool back as far as possible, shape (k, 7)."""
         path = [q_start]
-        p_RE, R_RE = self._arm.tip_position(q_start), self._arm.tip_rotation(q_start)
+        pose = self._arm.calc_pose(q_start)
+        p_RE, R_RE = pose.p_RE, pose.R_RE
         for k in range(1, round(RETREAT_M / RETREAT_STEP_M) + 1):
             q = self._follow(path[-1], p_RE - k * RETREAT_STEP_M * R_RE[:, 0], R_RE)
             if q is None or not self._is_free(b0, path[-1], q):
@@ -89,13 +88,13 @@ class Approach:
         """Returns joint angles near q that bring the tool to a nearby pose, or None."""
         arm = self._arm
         for _ in range(MAX_NEWTON_STEPS):
-            R = arm.tip_rotation(q)
+            pose = arm.calc_pose(q)
             # The missing rotation as a vector, exact to second order.
-            turn = 0.5 * np.cross(R, R_RE, axis=0).sum(axis=1)
-            error = np.concatenate([p_RE - arm.tip_position(q), turn])
+            turn = 0.5 * np.cross(pose.R_RE, R_RE, axis=0).sum(axis=1)
+            error = np.concatenate([p_RE - pose.p_RE, turn])
             if np.abs(error).max() < 1e-4:
                 return q
-            J = np.vstack([arm.tip_jacobian(q), arm.tip_angular_jacobian(q)])
+            J = np.vstack([pose.Jv_E, pose.Jw_E])
             q = q + J.T @ np.linalg.solve(J @ J.T + 1e-6 * np.eye(6), error)
             if np.any(q < arm.q_min) or np.any(q > arm.q_max):
                 return None

@@ -65,7 +65,7 @@ def density_lattice(starts: PlanarStarts, region: Region) -> Starts:
 def estimate_density(selector: LicSelector, situation: Situation, lattice: Starts) -> Vector:
     """Returns the estimates at n starts, shape (n,), NaN where the arm cannot start."""
     arm = situation.planar_starts.poses.arm
-    feasible = np.array([arm.solve_ik(x0) is not None for x0 in lattice.in_R])
+    feasible = np.array([len(arm.solve_ik(x0)) > 0 for x0 in lattice.in_R])
     density = np.full(len(feasible), np.nan)
     values = selector.objective(situation).values(lattice.take(feasible))
     density[feasible] = np.clip(values, 0.0, 1.0)

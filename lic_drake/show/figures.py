@@ -102,7 +102,4 @@ def describe_start(start: Start) -> str:
 def is_reachable(scenario: Scenario, stream: str, environment: int, p_WG: Vector) -> bool:
     """Returns whether the arm is long enough for a goal from one of the feasible bases."""
     starts = make_starts(scenario, scenario.sample_instance(stream, environment))
-    return any(
-        is_within_reach(scenario, p_WG - [x, y, 0.0], torso_m)
-        for x, y, torso_m in np.unique(starts.grid.b0, axis=0)
-    )
+    return any(is_within_reach(scenario, p_WG - b0) for b0 in np.unique(starts.grid.b0, axis=0))

@@ -39,7 +39,7 @@ class FilmCamera:
         head = replace(cameras.head, camera=_shrunk(cameras.head.camera))
         external = replace(cameras.external, camera=_shrunk(cameras.external.camera))
         small = replace(cameras, head=head, external=external)
-        self._rig = add_cameras(builder, instance, p_WG, small, placeable=True)
+        self._rig = add_cameras(builder, instance, p_WG, small, ahead=True)
         self._diagram = builder.Build()
         self._context = self._diagram.CreateDefaultContext()
 

@@ -98,7 +98,7 @@ class Recording:
         self._springs_back = instance.stems is not None
         self._clock_s = 0.0
         self._b0 = np.array([0.0, 0.0, scenario.task.torso_m])
-        initial = scene.plant.GetDefaultPositions(scene.arm)
+        initial = scene.plant.GetDefaultPositions(scene.arm)[scene.robot.q_index]
         self._q: Vector = initial if approach is None else approach.waiting
         self._set_up_view()
         if approach is not None:
@@ -110,12 +110,11 @@ class Recording:
         Args:
             trace: Its samples with their states.
             p_WG: Its goal, shape (3,), metres.
-            b0: Base position and torso height, shape (3,), metres; by default where the trace has
-                the base, and the torso at the height of the scenario's task.
+            b0: Base position and torso height, shape (3,), metres; by default the trace's.
         """
         self._draw_goal(p_WG)
         self._show_forces(True)
-        self._b0 = np.array([*trace.p_WR[:2], self._scenario.task.torso_m]) if b0 is None else b0
+        self._b0 = trace.p_WR if b0 is None else b0
         begin = self._clock_s
         for k in range(0, len(trace.states), self._sample_step()):
             self._clock_s = begin + trace.time_s[k]

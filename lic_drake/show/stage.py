@@ -9,7 +9,6 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.trace import SceneState
-from lic_drake.scene.furnish import place_robot
 from lic_drake.scene.scene import Scene, add_scene
 from lic_drake.show.pr2_meshes import attach_pr2_meshes
 from lic_drake.types import Vector
@@ -17,7 +16,7 @@ from lic_drake.types import Vector
 
 def in_plane(scenario: Scenario) -> bool:
     """Returns whether the robot is an arm in the plane."""
-    return scenario.arm().surface is None
+    return scenario.arm().is_planar
 
 
 class Stage:
@@ -49,16 +48,14 @@ class Stage:
             ModelError: The meshes cannot be read.
         """
         config = replace(scenario.scene, time_step_s=0.0)
-        self.scene = add_scene(
-            builder, scenario.arm(), instance, config, visuals=True, placeable=True
-        )
+        self.scene = add_scene(builder, scenario.arm(), instance, config, visuals=True, mobile=True)
         self.meshes = [] if drake_models is None else attach_pr2_meshes(self.scene, drake_models)
 
 
 def place(
     scene: Scene, root: Context, b0: Vector, q: Vector, state: SceneState | None = None
 ) -> None:
-    """Places the robot of a placeable scene, and the clutter if a state is given.
+    """Places the robot of a mobile scene, and the clutter if a state is given.
 
     Args:
         scene: The scene.
@@ -69,9 +66,9 @@ def place(
     """
     plant = scene.plant
     context = plant.GetMyMutableContextFromRoot(root)
-    place_robot(scene, root, b0)
-    plant.SetPositions(context, scene.arm, q)
-    plant.SetVelocities(context, scene.arm, np.zeros(len(q)) if state is None else state.v)
+    plant.SetPositions(context, scene.arm, scene.robot.positions(b0, q))
+    v = np.zeros(len(q)) if state is None else state.v
+    plant.SetVelocities(context, scene.arm, scene.robot.positions(np.zeros(3), v))
     if state is not None:
         plant.SetPositions(context, scene.clutter, state.p_WO.ravel())
         plant.SetVelocities(context, scene.clutter, state.v_WO.ravel())

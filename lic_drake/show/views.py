@@ -152,17 +152,18 @@ def _draw_arm(
     ax: Axes, arm: Arm, q: Vector, p_WR: Vector, axes: PlotAxes, color: str, alpha: float
 ) -> None:
     """Draws the skin's capsules as bars of their width."""
-    R_RL, p_RL = arm.link_poses(q)
-    for capsule in arm.skin:
+    pose = arm.calc_pose(q)
+    for capsule in (shape.enclosing_capsule() for shape in arm.skin):
+        radius, length = capsule.size
         link = arm.link_names.index(capsule.link)
-        middle = p_WR + p_RL[link] + R_RL[link] @ capsule.p_LC
-        half = 0.5 * capsule.length * R_RL[link] @ capsule.R_LC[:, 2]
+        middle = p_WR + pose.p_RL[link] + pose.R_RL[link] @ capsule.p_LS
+        half = 0.5 * length * pose.R_RL[link] @ capsule.R_LS[:, 2]
         begin, end = (middle - half)[list(axes)], (middle + half)[list(axes)]
         for x, y in (begin, end):
-            ax.add_patch(Circle((x, y), capsule.radius, color=color, alpha=alpha, lw=0))
-        length = float(np.linalg.norm(end - begin))
-        if length > 1e-9:
-            side = capsule.radius / length * np.array([begin[1] - end[1], end[0] - begin[0]])
+            ax.add_patch(Circle((x, y), radius, color=color, alpha=alpha, lw=0))
+        seen = float(np.linalg.norm(end - begin))
+        if seen > 1e-9:
+            side = radius / seen * np.array([begin[1] - end[1], end[0] - begin[0]])
             corners = [begin - side, begin + side, end + side, end - side]
             ax.add_patch(Polygon(corners, closed=True, color=color, alpha=alpha, lw=0))
 

@@ -4,7 +4,8 @@ from functools import cache
 from xml.etree import ElementTree
 
 from lic_drake.paths import models_dir
-from lic_drake.robots.planar import PlanarArm
+from lic_drake.robots.arm import Arm
+from lic_drake.robots.planar import make_planar_arm
 from lic_drake.robots.registry import register_robot
 
 LONGER_M = 0.06
@@ -38,9 +39,9 @@ def _shift(origin: ElementTree.Element | None, by_m: float) -> None:
 
 
 @cache
-def long_arm() -> PlanarArm:
+def long_arm() -> Arm:
     """Returns the arm, read once a process."""
-    return PlanarArm(_describe(), name="long-arm")
+    return make_planar_arm("long-arm", _describe())
 
 
 register_robot("long-arm", long_arm)

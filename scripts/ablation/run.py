@@ -77,7 +77,7 @@ def other_features(Z: Vector, x0: Vector) -> dict[str, Vector]:
     way = np.arctan2(goal[:, 1:] - y, goal[:, :1] - x0[:, :1])
     arm = get_robot("planar-arm")
     poses, index = np.unique(x0, axis=0, return_inverse=True)
-    q = np.array([arm.solve_ik(pose) for pose in poses])[index.ravel()]
+    q = np.array([arm.solve_ik(pose)[0] for pose in poses])[index.ravel()]
     p_WG = np.column_stack([goal, np.zeros(len(goal))])
     cost = [corridor_cost(x0[i : i + 1], p_WG[i])[0] for i in range(len(Z))]
     return {

@@ -67,7 +67,7 @@ def main() -> None:
     parser.add_argument("--reaches", type=int, default=200)
     add_workers(parser)
     args = parser.parse_args()
-    in_plane = load_scenario(args.scenario).arm().surface is None
+    in_plane = load_scenario(args.scenario).arm().is_planar
     rows = {}
     for name, overrides in (PLANAR if in_plane else IN_SPACE).items():
         scenario = load_scenario(args.scenario, overrides)

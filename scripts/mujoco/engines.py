@@ -42,7 +42,7 @@ class Engine:
             return lambda request: simulate(
                 simulation,
                 scenario,
-                arm.solve_ik(request.start.x0),
+                arm.solve_ik(request.start.x0)[0],
                 request.goal,
             )
         if self.time_step_s is not None:

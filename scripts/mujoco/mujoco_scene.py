@@ -21,7 +21,7 @@ from pydrake.multibody.plant import MultibodyPlant
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import ScenarioError
-from lic_drake.robots.planar import PlanarArm
+from lic_drake.robots.arm import Arm
 from lic_drake.scene.scene import SceneConfig
 from lic_drake.types import Vector
 
@@ -68,7 +68,7 @@ class MujocoScene:
 
 
 def make_mujoco_scene(
-    arm: PlanarArm, instance: ClutterInstance, scene: SceneConfig, config: MujocoConfig
+    arm: Arm, instance: ClutterInstance, scene: SceneConfig, config: MujocoConfig
 ) -> MujocoScene:
     """Builds the model of the planar arm among upright cylinders of one mass.
 
@@ -109,12 +109,15 @@ def make_mujoco_scene(
     return MujocoScene(model=model, link_of=link_of)
 
 
-def _add_arm(spec: mujoco.MjSpec, arm: PlanarArm, friction: float) -> None:
+def _add_arm(spec: mujoco.MjSpec, arm: Arm, friction: float) -> None:
     """Adds the links with their impedance; their geometries touch objects only."""
     plant = MultibodyPlant(time_step=1e-3)
     model = arm.add_to_plant(plant)
     plant.Finalize()
     parent, p_PJ = spec.worldbody, np.zeros(3)
+    pose = arm.calc_pose(np.zeros(arm.num_joints))
+    joints = np.vstack([pose.p_RL, pose.p_RE])
+    lengths = np.linalg.norm(np.diff(joints, axis=0), axis=1)
     for i, (name, capsule) in enumerate(zip(arm.link_names, arm.skin, strict=True)):
         inertia = plant.GetBodyByName(name, model).default_spatial_inertia()
         about_com = inertia.Shift(inertia.get_com()).CalcRotationalInertia()
@@ -137,9 +140,9 @@ def _add_arm(spec: mujoco.MjSpec, arm: PlanarArm, friction: float) -> None:
             body.add_geom(
                 name=_skin_name(name, bit),
                 type=mujoco.mjtGeom.mjGEOM_CAPSULE,
-                size=[capsule.radius, 0.5 * capsule.length, 0.0],
-                pos=capsule.p_LC,
-                zaxis=capsule.R_LC[:, 2],
+                size=[capsule.size[0], 0.5 * capsule.size[1], 0.0],
+                pos=capsule.p_LS,
+                zaxis=capsule.R_LS[:, 2],
                 contype=0,
                 conaffinity=bit,
                 priority=2,
@@ -148,7 +151,7 @@ def _add_arm(spec: mujoco.MjSpec, arm: PlanarArm, friction: float) -> None:
             )
         servo = spec.add_actuator(trntype=mujoco.mjtTrn.mjTRN_JOINT, target=f"joint{i}")
         servo.set_to_position(kp=arm.stiffness[i], kv=arm.damping[i])
-        parent, p_PJ = body, np.array([0.0, -arm.kinematics.link_lengths[i], 0.0])
+        parent, p_PJ = body, np.array([0.0, -lengths[i], 0.0])
 
 
 def _add_clutter(
@@ -186,7 +189,7 @@ def _add_clutter(
 
 
 def _set_stiffness(
-    model: mujoco.MjModel, arm: PlanarArm, instance: ClutterInstance, scene: SceneConfig
+    model: mujoco.MjModel, arm: Arm, instance: ClutterInstance, scene: SceneConfig
 ) -> None:
     """Writes `solref` so that contacts have a stiffness in N/m and a damping in Ns/m."""
     movable = np.flatnonzero(instance.movable)
@@ -208,7 +211,7 @@ def _set_stiffness(
         model.geom(f"object{i}").solref[:] = _solref(stiffness, A)
 
 
-def _metric_ratio(model: mujoco.MjModel, arm: PlanarArm, link: int, lightness: float) -> float:
+def _metric_ratio(model: mujoco.MjModel, arm: Arm, link: int, lightness: float) -> float:
     """Returns by how much the discrete integrator scales A for a push on the middle of a link.
 
     It takes A of M + h D + h^2 K instead of M, row by row; here at the middle of the joint ranges.
@@ -222,10 +225,11 @@ def _metric_ratio(model: mujoco.MjModel, arm: PlanarArm, link: int, lightness: f
     M = np.diag(full)[: len(q)]
     h = model.opt.timestep
     capsule = arm.skin[link]
-    R_RL, p_RL = arm.link_poses(q)
-    p_RC = p_RL[link] + R_RL[link] @ capsule.p_LC
-    side = np.cross([0.0, 0.0, 1.0], R_RL[link] @ capsule.R_LC[:, 2])
-    row = side @ arm.point_jacobians(q, np.array([link]), p_RC[None])[0]
+    pose = arm.calc_pose(q)
+    R_RL = pose.R_RL[link]
+    p_RC = pose.p_RL[link] + R_RL @ capsule.p_LS
+    side = np.cross([0.0, 0.0, 1.0], R_RL @ capsule.R_LS[:, 2])
+    row = side @ arm.point_jacobians(pose, np.array([link]), p_RC[None])[0]
     plain = row @ (row / M) + lightness
     stiffened = row @ (row / (M + h * arm.damping + h**2 * arm.stiffness)) + lightness
     return float(stiffened / plain)

@@ -79,8 +79,8 @@ class MujocoSimulation:
         mujoco.mj_forward(self.model, self.data)
         patches = self._read_patches()
         if patches:
-            poses = self._arm.link_poses(self.joint_angles())
-            self._taxel_force = calc_taxel_forces(self._layout, *poses, patches)
+            pose = self._arm.calc_pose(self.joint_angles())
+            self._taxel_force = calc_taxel_forces(self._layout, pose.R_RL, pose.p_RL, patches)
         else:
             self._taxel_force = np.zeros(self._layout.num_taxels)
 

@@ -20,11 +20,10 @@ from lic_drake.evaluate.table import Table
 from lic_drake.experience.schema import scenario_text
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
-from lic_drake.reach.pointing_starts import PointingStarts, pointing_starts
+from lic_drake.reach.pointing_starts import ROBOT_TO_CLUTTER, PointingStarts, pointing_starts
 from lic_drake.reach.scenario import parse_scenario
 from lic_drake.reach.start import Starts
-from lic_drake.robots.pr2 import Pr2Arm
-from lic_drake.robots.pr2_inverse import ROBOT_TO_CLUTTER, solve_pointing
+from lic_drake.robots.pr2_kinematics import Pr2Kinematics
 from lic_drake.seeds import make_generator
 from lic_drake.select.objective import SuccessModel, SuccessObjective
 from lic_drake.select.pointing_lic import PointingLbfgsb, PointingLic, is_apart
@@ -58,19 +57,17 @@ def sample_conditions(starts: PointingStarts, count: int, rng: np.random.Generat
     """
     stand = starts.stand
     arm = starts.scenario.arm()
-    assert isinstance(arm, Pr2Arm)
+    kinematics = arm.kinematics
+    assert isinstance(kinematics, Pr2Kinematics)
     p_WA = starts.p_WA[rng.integers(len(starts.p_WA), size=count)]
     y_m = rng.uniform(stand.y_min_m, stand.y_max_m, count)
     torso_m = rng.uniform(stand.torso_min_m, stand.torso_max_m, count)
     pan = np.sort(rng.uniform(arm.q_min[0], arm.q_max[0], count))
-    # One arm serves all heights: a raised torso is a lowered aperture.
-    p_RA = p_WA - np.column_stack([np.zeros(count), y_m, torso_m - arm.torso_m])
-    q = solve_pointing(arm.kinematics, p_RA, ROBOT_TO_CLUTTER, pan)
-    sample = np.searchsorted(pan, q[:, 0])
+    b0 = np.column_stack([np.zeros(count), y_m, torso_m])
+    q, sample = kinematics.solve_at(p_WA - b0, ROBOT_TO_CLUTTER, pan)
     pose = np.array([arm.tip_pose(row) for row in q]).reshape(-1, 7)
     pose[:, :3] = p_WA[sample]
-    p_WR = np.column_stack([np.zeros(count), y_m])[sample]
-    return Starts(pose, np.column_stack([p_WR, torso_m[sample]]))
+    return Starts(pose, b0[sample])
 
 
 def best_possible(starts: PointingStarts, samples: Starts, values: Vector) -> float:
@@ -88,8 +85,8 @@ def is_possible(starts: PointingStarts, chosen: Selection) -> bool:
     """Tells whether a selection is, by its own joint angles and by a search for others."""
     x0, b0, q = chosen.start.x0, chosen.start.b0, chosen.start.q
     assert q is not None
-    tool = starts.scenario.arm(b0[2]).tip_pose(q)[:3] + [*b0[:2], 0.0]
-    touches = starts.checker.touches(np.r_[b0[:2], 0.0, b0[2], q])
+    tool = starts.scenario.arm().tip_pose(q)[:3] + b0
+    touches = starts.checker.touches(b0, q)
     again = starts.angles(x0, b0[:2], b0[2])
     return bool(np.allclose(tool, x0[:3], atol=1e-6)) and not touches and again is not None
 

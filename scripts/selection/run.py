@@ -18,7 +18,6 @@ from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 from lic_drake.reach.start import Starts
 from lic_drake.reach.starts import planar_starts
-from lic_drake.robots.planar import PlanarArm
 from lic_drake.select.objective import Objective
 from lic_drake.select.planar_lic import PlanarLbfgsb, PlanarLic
 from lic_drake.select.registry import fit_model
@@ -40,7 +39,7 @@ def main() -> int:
     library = ExperienceLibrary(args.library)
     scenario = library.scenario()
     arm = scenario.arm()
-    if not isinstance(arm, PlanarArm):
+    if not arm.is_planar:
         parser.error(f"{args.library} is of another robot than the planar arm")
     starts = planar_starts(scenario, scenario.sample_instance("holdout", 0))
     poses = starts.poses.scan(*SCAN)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lic_drake.reach.start import Starts
-from lic_drake.robots.planar import PlanarArm
+from lic_drake.robots.arm import Arm
 from lic_drake.select.objective import SuccessObjective
 from lic_drake.select.planar_lic import PlanarLic
 from lic_drake.select.situation import FailedReach, Situation
@@ -89,7 +89,7 @@ class MixtureLic(PlanarLic):
     """
 
     def __init__(
-        self, arm: PlanarArm, categories: Mapping[str, Category], *, updates: bool = True
+        self, arm: Arm, categories: Mapping[str, Category], *, updates: bool = True
     ) -> None:
         self.categories = dict(categories)
         self.updates = updates

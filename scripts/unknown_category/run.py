@@ -22,7 +22,6 @@ from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario, parse_scenario
 from lic_drake.reach.starts import make_starts
-from lic_drake.robots.planar import PlanarArm
 from lic_drake.select.planar_lic import PlanarLic
 from lic_drake.select.registry import Selector, make_selector
 from lic_drake.select.situation import FailedReach, Situation
@@ -66,7 +65,7 @@ def make_strategies(
         estimator: Of LIC.
     """
     arm = common_scenario(next(iter(libraries.values()))).arm()
-    assert isinstance(arm, PlanarArm)
+    assert arm.is_planar
     known: dict[str, PlanarLic] = {}
     final: dict[str, FinalPositions] = {}
     for name, library in libraries.items():

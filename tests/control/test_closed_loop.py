@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
+from support.kinematics import only
 from support.reaches import start_context
 from support.worlds import ARM, LAYOUT, cylinder, make_clutter
 
@@ -46,7 +47,7 @@ def run(
             np.array(reach.diagram.GetOutputPort(name).Eval(context))
             for name in ("arm_state", "taxel_force", "clutter_state")
         )
-        samples.append((context.get_time(), ARM.tip_position(state[:3])[:2], force, objects))
+        samples.append((context.get_time(), ARM.calc_pose(state[:3]).p_RE[:2], force, objects))
     return Run(
         time=np.array([sample[0] for sample in samples]),
         p_WE=np.array([sample[1] for sample in samples]),
@@ -82,7 +83,7 @@ def test_in_free_space_the_hand_comes_to_the_goal_and_stays_there(
     start: tuple[float, float, float],
     goal: tuple[float, float],
 ) -> None:
-    q = ARM.solve_ik(np.array([start[0], start[1], np.deg2rad(start[2])]))
+    q = only(ARM.solve_ik(np.array([start[0], start[1], np.deg2rad(start[2])])))
     assert q is not None
     begin, end = np.array(start[:2]), np.array(goal)
     reach = run(f"{{mpc: {{preset: {preset}}}}}", make_clutter(), q, np.append(end, 0.0), time)
@@ -111,11 +112,11 @@ def test_against_a_fixed_cylinder_the_force_settles_at_the_threshold(
     preset: str, threshold: float, time: float, side: float
 ) -> None:
     q = np.deg2rad([-30.0, 60.0, 50.0])
-    R_RL, p_RL = ARM.link_poses(q)
+    R_RL, p_RL = ARM.calc_pose(q)[:2]
     across, along = side * R_RL[2, :, 0], -R_RL[2, :, 1]
     # On link 3's side near the hand, 3 mm off; the goal is right behind it.
     obstacle = cylinder(*(p_RL[2] + 0.25 * along + 0.028 * across)[:2])
-    goal = ARM.tip_position(q) + 0.12 * across
+    goal = ARM.calc_pose(q).p_RE + 0.12 * across
     overrides = f"{{mpc: {{preset: {preset}, force_threshold_N: {threshold}}}}}"
     reach = run(overrides, make_clutter(obstacle), q, goal, time)
     peak = reach.taxel_force.max(axis=1)
@@ -133,10 +134,10 @@ def test_against_a_fixed_cylinder_the_force_settles_at_the_threshold(
 @pytest.mark.parametrize("preset", ["haptic_mpc_2013", "ijrr_2013"])
 def test_a_movable_cylinder_is_pushed_away_and_the_goal_reached(preset: str) -> None:
     q = np.deg2rad([-30.0, 60.0, 50.0])
-    R_RL, p_RL = ARM.link_poses(q)
+    R_RL, p_RL = ARM.calc_pose(q)[:2]
     across, along = R_RL[2, :, 0], -R_RL[2, :, 1]
     obstacle = cylinder(*(p_RL[2] + 0.25 * along + 0.028 * across)[:2], movable=True)
-    goal = ARM.tip_position(q) + 0.12 * across
+    goal = ARM.calc_pose(q).p_RE + 0.12 * across
     reach = run(f"{{mpc: {{preset: {preset}}}}}", make_clutter(obstacle), q, goal, 10.0)
     distance = np.linalg.norm(reach.p_WE - goal[:2], axis=1)
     assert np.min(distance) < SUCCESS

@@ -31,16 +31,16 @@ def taxel_state(
     """The controller's input at a configuration with forces on some taxels."""
     index = np.array(taxels, dtype=int)
     links = LAYOUT.link[index]
-    R_RL, p_RL = ARM.link_poses(q)
+    R_RL, p_RL = ARM.calc_pose(q)[:2]
     p_RC = p_RL[links] + np.einsum("ijk,ik->ij", R_RL[links], LAYOUT.p_LT[index])
     return MpcInput(
         q=q,
         q_d=q if q_d is None else q_d,
         p_EG=np.array(p_EG),
-        Jv_E=ARM.tip_jacobian(q),
+        Jv_E=ARM.calc_pose(q).Jv_E,
         normals=np.einsum("ijk,ik->ij", R_RL[links], LAYOUT.n_L[index]),
         forces=np.array(forces, dtype=float),
-        Jv_C=ARM.point_jacobians(q, links, p_RC),
+        Jv_C=ARM.point_jacobians(ARM.calc_pose(q), links, p_RC),
     )
 
 
@@ -65,15 +65,15 @@ def settle(q_start: np.ndarray, q_d: np.ndarray, taxels: list[int], stiffness: f
     links = LAYOUT.link[index]
 
     def points(q: np.ndarray) -> np.ndarray:
-        R_RL, p_RL = ARM.link_poses(q)
+        R_RL, p_RL = ARM.calc_pose(q)[:2]
         return p_RL[links] + np.einsum("ijk,ik->ij", R_RL[links], LAYOUT.p_LT[index])
 
     rest = points(q_start)
-    normals = np.einsum("ijk,ik->ij", ARM.link_poses(q_start)[0][links], LAYOUT.n_L[index])
+    normals = np.einsum("ijk,ik->ij", ARM.calc_pose(q_start)[:2][0][links], LAYOUT.n_L[index])
 
     def torque(q: np.ndarray) -> np.ndarray:
         compression = np.einsum("ij,ij->i", points(q) - rest, normals)
-        jacobians = ARM.point_jacobians(q, links, points(q))
+        jacobians = ARM.point_jacobians(ARM.calc_pose(q), links, points(q))
         pull = np.einsum("i,ij,ijk->k", stiffness * compression, normals, jacobians)
         return K * (q_d - q) - pull
 
@@ -94,7 +94,7 @@ def test_the_model_is_the_derivative_of_the_static_balance(
         delta = step * np.eye(3)[joint]
         above, below = (settle(q, q + sign * delta, taxels, stiffness) for sign in (1.0, -1.0))
         np.testing.assert_allclose(model.joint[:, joint], (above - below) / (2 * step), atol=1e-5)
-        tip = (ARM.tip_position(above) - ARM.tip_position(below)) / (2 * step)
+        tip = (ARM.calc_pose(above).p_RE - ARM.calc_pose(below).p_RE) / (2 * step)
         np.testing.assert_allclose(model.tip[:, joint], tip, atol=1e-5)
         motion = np.einsum("ijk,k->ij", state.Jv_C, (above - below) / (2 * step))
         force = stiffness * np.einsum("ij,ij->i", motion, state.normals)
@@ -222,7 +222,7 @@ def test_a_force_over_the_threshold_is_pulled_down_whatever_the_goal(
 ) -> None:
     q = np.deg2rad([-30.0, 60.0, 50.0])
     taxel = 140
-    push_on = ARM.link_poses(q)[0][2] @ LAYOUT.n_L[taxel] * 0.3
+    push_on = ARM.calc_pose(q)[:2][0][2] @ LAYOUT.n_L[taxel] * 0.3
     mpc = make_mpc(preset())
     state = taxel_state(q, [taxel], [force], q_d=q, p_EG=tuple(push_on))
     change = float((mpc.predict(state).force @ mpc.step(state))[0])
@@ -251,7 +251,7 @@ def test_a_joint_beyond_its_limit_goes_no_further_or_comes_back_at_once(side: fl
     q = np.array([-0.5, 1.0, limit + 0.02 * side])
     q_d = np.array([-0.5, 1.0, limit])
     for sign in (-1.0, 1.0):
-        goal = tuple(0.3 * sign * ARM.tip_jacobian(q)[:, 2])
+        goal = tuple(0.3 * sign * ARM.calc_pose(q).Jv_E[:, 2])
         state = taxel_state(q, [], [], q_d, goal)
         x = make_mpc(haptic_mpc_2013()).step(state)
         assert side * x[2] <= 1e-9
@@ -267,7 +267,7 @@ def test_the_equilibrium_stays_inside_wind_up_and_joint_limits(joint: int, side:
     mpc = make_mpc(haptic_mpc_2013())
 
     def step(q: np.ndarray, q_d: np.ndarray) -> float:
-        pull = tuple(0.5 * side * ARM.tip_jacobian(q)[:, joint])
+        pull = tuple(0.5 * side * ARM.calc_pose(q).Jv_E[:, joint])
         return side * mpc.step(taxel_state(q, [], [], q_d, pull))[joint]
 
     q = np.deg2rad([-30.0, 60.0, 50.0])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
+from support.kinematics import link_origins
 from support.worlds import ARM, LAYOUT
 
 from lic_drake.control.mpc import HapticMpc, MpcInput
@@ -45,14 +46,16 @@ def test_the_desired_state_is_one_mpc_step_on_with_no_velocity(preset: type[MpcC
         angle = np.cumsum(Q)[link]
         c, s = np.cos(angle), np.sin(angle)
         turn = np.array([[c, -s], [s, c]])
-        point = ARM.kinematics.link_origins(Q)[link] + turn @ LAYOUT.p_LT[taxel, :2]
-        jacobian = np.vstack([ARM.kinematics.point_jacobian(Q, link, point), np.zeros(3)])
+        point = link_origins(ARM, Q)[link] + turn @ LAYOUT.p_LT[taxel, :2]
+        p_JQ = point - link_origins(ARM, Q)[:3]
+        jacobian = np.vstack([-p_JQ[:, 1], p_JQ[:, 0], np.zeros(3)])
+        jacobian[:, link + 1 :] = 0.0
         contacts.append((np.append(turn @ LAYOUT.n_L[taxel, :2], 0.0), jacobian))
     state = MpcInput(
         q=Q,
         q_d=q_d,
-        p_EG=GOAL - ARM.tip_position(Q),
-        Jv_E=ARM.tip_jacobian(Q),
+        p_EG=GOAL - ARM.calc_pose(Q).p_RE,
+        Jv_E=ARM.calc_pose(Q).Jv_E,
         normals=np.array([normal for normal, _ in contacts]),
         forces=np.array([3.0, 7.0, 2.0]),
         Jv_C=np.array([jacobian for _, jacobian in contacts]),

@@ -14,7 +14,7 @@ Q = np.deg2rad([-30.0, 60.0, 50.0])
 
 def pressed_world(modulus: float, radius: float) -> World:
     """Link 3 presses on a slippery fixed cylinder: the model knows no friction."""
-    R_RL, p_RL = ARM.link_poses(Q)
+    R_RL, p_RL = ARM.calc_pose(Q)[:2]
     across, along = R_RL[2, :, 0], -R_RL[2, :, 1]
     obstacle = cylinder(*(p_RL[2] + 0.2 * along + (0.015 + radius) * across)[:2], radius=radius)
     contact = ContactConfig(
@@ -23,7 +23,7 @@ def pressed_world(modulus: float, radius: float) -> World:
     world = make_world(
         Q, make_clutter(obstacle), SceneConfig(time_step_s=0.005, contact=contact), add_sensor
     )
-    world.set_equilibrium(Q + np.linalg.pinv(ARM.tip_jacobian(Q)) @ (0.03 * across))
+    world.set_equilibrium(Q + np.linalg.pinv(ARM.calc_pose(Q).Jv_E) @ (0.03 * across))
     world.advance(8.0)
     return world
 
@@ -33,16 +33,16 @@ def measure(world: World, q_d: np.ndarray, p_WG: np.ndarray) -> MpcInput:
     forces, q = world.taxel_force, world.q
     loaded = np.flatnonzero(forces)
     links = LAYOUT.link[loaded]
-    R_RL, p_RL = ARM.link_poses(q)
+    R_RL, p_RL = ARM.calc_pose(q)[:2]
     p_RC = p_RL[links] + np.einsum("ijk,ik->ij", R_RL[links], LAYOUT.p_LT[loaded])
     return MpcInput(
         q=q,
         q_d=q_d,
-        p_EG=p_WG - ARM.tip_position(q),
-        Jv_E=ARM.tip_jacobian(q),
+        p_EG=p_WG - ARM.calc_pose(q).p_RE,
+        Jv_E=ARM.calc_pose(q).Jv_E,
         normals=np.einsum("ijk,ik->ij", R_RL[links], LAYOUT.n_L[loaded]),
         forces=forces[loaded],
-        Jv_C=ARM.point_jacobians(q, links, p_RC),
+        Jv_C=ARM.point_jacobians(ARM.calc_pose(q), links, p_RC),
     )
 
 
@@ -77,12 +77,12 @@ def test_a_step_moves_hand_and_force_as_predicted_once_the_arm_has_settled(
     for goal in ((0.3, 0.0, 0.0), (-0.3, 0.1, 0.0), (0.0, 0.4, 0.0), (0.1, -0.4, 0.0)):
         world.set_equilibrium(q_d)
         world.advance(6.0)
-        start = measure(world, q_d, ARM.tip_position(world.q) + np.array(goal))
+        start = measure(world, q_d, ARM.calc_pose(world.q).p_RE + np.array(goal))
         step = mpc.step(start)
         world.set_equilibrium(q_d + step)
         world.advance(6.0)
         model = mpc.predict(start)
-        moved = ARM.tip_position(world.q) - ARM.tip_position(start.q)
+        moved = ARM.calc_pose(world.q).p_RE - ARM.calc_pose(start.q).p_RE
         expected = model.tip @ step
         assert np.linalg.norm(expected) > 2e-4
         assert np.linalg.norm(moved - expected) < 0.1 * np.linalg.norm(expected)

@@ -7,8 +7,8 @@ from pydrake.systems.framework import DiagramBuilder
 from lic_drake.control.surface_taxels import INSIDE_M, is_inside, make_taxels, surface_taxels
 from lic_drake.control.taxels import planar_taxels
 from lic_drake.robots.planar import planar_arm
-from lic_drake.robots.pr2 import pr2_arm
-from lic_drake.robots.skin_shape import SkinShape
+from lic_drake.robots.pr2 import Q_HOME, pr2_arm
+from lic_drake.robots.skin import SkinShape
 
 ARM = pr2_arm()
 LAYOUT = make_taxels(ARM, 50.0)
@@ -27,7 +27,7 @@ def test_taxels_lie_on_the_links_surface_with_normals_out_of_it() -> None:
     plant.Finalize()
     diagram = builder.Build()
     root = diagram.CreateDefaultContext()
-    plant.SetPositions(plant.GetMyMutableContextFromRoot(root), pr2, ARM.q_home)
+    plant.SetPositions(plant.GetMyMutableContextFromRoot(root), pr2, Q_HOME)
     query: QueryObject = scene_graph.get_query_output_port().Eval(
         scene_graph.GetMyContextFromRoot(root)
     )

@@ -9,7 +9,7 @@ from lic_drake.robots.planar import planar_arm
 
 ARM = planar_arm()
 LAYOUT = planar_taxels(ARM.skin)
-POSES = ARM.link_poses(np.deg2rad([-30.0, 60.0, 50.0]))
+POSES = ARM.calc_pose(np.deg2rad([-30.0, 60.0, 50.0]))[:2]
 ANGLE = st.floats(-np.pi, np.pi)
 LINK = st.integers(0, 2)
 
@@ -180,7 +180,7 @@ def test_faces_whose_forces_cancel_read_nothing() -> None:
 
 @given(ANGLE, ANGLE, ANGLE)
 def test_readings_do_not_depend_on_the_configuration(q1: float, q2: float, q3: float) -> None:
-    R_RL, p_RL = ARM.link_poses(np.array([q1, q2, q3]))
+    R_RL, p_RL = ARM.calc_pose(np.array([q1, q2, q3]))[:2]
     p_L, f_L = np.array([0.015, -0.1234, 0.0]), np.array([2.0, 0.5, 0.0])
     patch = make_patch(1, (p_RL[1] + R_RL[1] @ p_L)[None], (R_RL[1] @ f_L)[None])
     np.testing.assert_allclose(

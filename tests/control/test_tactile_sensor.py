@@ -36,14 +36,14 @@ def press(
 ) -> None:
     """Presses an object on a link with a force that follows the link's normal as it yields."""
     for _ in range(round(duration / 0.1)):
-        normal = ARM.link_poses(world.q)[0][link] @ normal_L
+        normal = ARM.calc_pose(world.q)[:2][0][link] @ normal_L
         world.push(body, np.zeros(3), -force * normal)
         world.advance(0.1)
 
 
 def object_at(taxel: int, clearance: float = 1e-4, along: float = 0.0) -> ClutterInstance:
     """A movable cylinder just off a taxel, `along` metres further in the row."""
-    R_RL, p_RL = ARM.link_poses(BENT)
+    R_RL, p_RL = ARM.calc_pose(BENT)[:2]
     link = LAYOUT.link[taxel]
     p_LO = LAYOUT.p_LT[taxel] + (0.01 + clearance) * LAYOUT.n_L[taxel] + [0.0, along, 0.0]
     return cylinder(*(p_RL[link] + R_RL[link] @ p_LO)[:2], movable=True)
@@ -66,10 +66,10 @@ def joint_torques(world: World, forces: np.ndarray) -> np.ndarray:
     """What the taxels' forces do to the joints, through the taxels' Jacobians."""
     loaded = np.flatnonzero(forces)
     links = LAYOUT.link[loaded]
-    R_RL, p_RL = ARM.link_poses(world.q)
+    R_RL, p_RL = ARM.calc_pose(world.q)[:2]
     p_RT = p_RL[links] + np.einsum("ijk,ik->ij", R_RL[links], LAYOUT.p_LT[loaded])
     normals = np.einsum("ijk,ik->ij", R_RL[links], LAYOUT.n_L[loaded])
-    jacobians = ARM.point_jacobians(world.q, links, p_RT)
+    jacobians = ARM.point_jacobians(ARM.calc_pose(world.q), links, p_RT)
     return -np.einsum("i,ij,ijk->k", forces[loaded], normals, jacobians)
 
 
@@ -111,8 +111,8 @@ def test_two_objects_on_two_links_light_up_their_taxels_and_their_torques_add_up
     plant = world.scene.plant
     for _ in range(30):
         # `push` applies one force: hold the other object by a joint force on its slides.
-        normal = ARM.link_poses(world.q)[0][1] @ LAYOUT.n_L[58]
-        other = ARM.link_poses(world.q)[0][2] @ LAYOUT.n_L[171]
+        normal = ARM.calc_pose(world.q)[:2][0][1] @ LAYOUT.n_L[58]
+        other = ARM.calc_pose(world.q)[:2][0][2] @ LAYOUT.n_L[171]
         world.push("object0", np.zeros(3), -4.0 * normal)
         plant.get_applied_generalized_force_input_port().FixValue(
             world.plant_context, np.concatenate([np.zeros(5), -2.0 * other[:2]])
@@ -126,7 +126,7 @@ def test_two_objects_on_two_links_light_up_their_taxels_and_their_torques_add_up
 
 
 def test_a_wall_along_the_arm_loads_many_taxels_with_its_whole_force() -> None:
-    R_RL, p_RL = ARM.link_poses(BENT)
+    R_RL, p_RL = ARM.calc_pose(BENT)[:2]
     centre = p_RL[2] + R_RL[2] @ [0.0151 + 0.01, -0.14, 0.0]
     yaw = float(np.arctan2(R_RL[2, 1, 1], R_RL[2, 0, 1]))
     wall = box(*centre[:2], (0.16, 0.02, 0.1), yaw, movable=True)
@@ -143,7 +143,7 @@ def test_a_wall_along_the_arm_loads_many_taxels_with_its_whole_force() -> None:
 
 @pytest.mark.parametrize("turn_deg", [10.0, 30.0, 45.0])
 def test_the_corner_of_a_box_reads_its_force_once_and_near_the_corner(turn_deg: float) -> None:
-    R_RL, p_RL = ARM.link_poses(BENT)
+    R_RL, p_RL = ARM.calc_pose(BENT)[:2]
     normal, along = R_RL[2, :, 0], -R_RL[2, :, 1]
     corner = p_RL[2] + 0.1 * along + 0.0151 * normal
     half = 0.02

@@ -4,20 +4,24 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lic_drake.control.taxels import CAP_ANGLES_DEG, planar_taxels
-from lic_drake.robots.arm import SkinCapsule
 from lic_drake.robots.planar import planar_arm
+from lic_drake.robots.skin import SkinShape
 
 ARM = planar_arm()
 LAYOUT = planar_taxels(ARM.skin)
 
 
-def capsule(radius: float, length: float, angle: float, p_LC: tuple[float, float]) -> SkinCapsule:
+def capsule(radius: float, length: float, angle: float, p_LC: tuple[float, float]) -> SkinShape:
     """A capsule whose axis lies in the plane at an angle from Lx."""
     axis = np.array([np.cos(angle), np.sin(angle), 0.0])
     up = np.array([0.0, 0.0, 1.0])
     R_LC = np.column_stack([up, np.cross(axis, up), axis])
-    return SkinCapsule(
-        link="link", radius=radius, length=length, R_LC=R_LC, p_LC=np.append(p_LC, 0.0)
+    return SkinShape(
+        link="link",
+        kind="capsule",
+        size=(radius, length),
+        R_LS=R_LC,
+        p_LS=np.append(p_LC, 0.0),
     )
 
 
@@ -70,9 +74,9 @@ def test_taxels_of_any_capsule_lie_on_its_surface_with_outward_unit_normals(
 ) -> None:
     skin = capsule(radius, length, angle, p_LC)
     layout = planar_taxels((skin,), per_metre)
-    axis = skin.R_LC[:, 2]
-    along = np.clip((layout.p_LT - skin.p_LC) @ axis, -0.5 * length, 0.5 * length)
-    nearest = skin.p_LC + along[:, None] * axis
+    axis = skin.R_LS[:, 2]
+    along = np.clip((layout.p_LT - skin.p_LS) @ axis, -0.5 * length, 0.5 * length)
+    nearest = skin.p_LS + along[:, None] * axis
     np.testing.assert_allclose(np.linalg.norm(layout.n_L, axis=1), 1.0, atol=1e-12)
     np.testing.assert_allclose(layout.p_LT, nearest + radius * layout.n_L, atol=1e-12)
     np.testing.assert_allclose(layout.p_LT[:, 2], 0.0, atol=1e-12)

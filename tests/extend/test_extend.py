@@ -71,8 +71,8 @@ def test_the_long_arm_is_where_drake_says(extend: Extensions) -> None:
     for q in np.random.default_rng(0).uniform(arm.q_min, arm.q_max, (20, 3)):
         plant.SetPositions(context, q)
         X_WE = plant.GetFrameByName("tip", instance).CalcPoseInWorld(context)
-        np.testing.assert_allclose(arm.tip_position(q), X_WE.translation(), atol=1e-9)
-        R_RL, p_RL = arm.link_poses(q)
+        np.testing.assert_allclose(arm.calc_pose(q).p_RE, X_WE.translation(), atol=1e-9)
+        R_RL, p_RL = arm.calc_pose(q)[:2]
         for link, name in enumerate(arm.link_names):
             X_WL = plant.GetBodyByName(name, instance).EvalPoseInWorld(context)
             np.testing.assert_allclose(R_RL[link], X_WL.rotation().matrix(), atol=1e-9)

@@ -62,7 +62,7 @@ def by_hand(requests: list[ReachRequest]) -> list[ReachRecord]:
     instance, records = drawn, []
     for request in requests:
         base = request.start.b0
-        environment = Environment(SCENARIO, instance, p_WR=base)
+        environment = Environment(SCENARIO, instance, b0=base)
         result = environment.reach(request.goal, request.start.x0)
         assert result.trace.p_WO is not None
         instance = drawn.with_objects_at(result.trace.p_WO)

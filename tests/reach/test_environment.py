@@ -30,7 +30,7 @@ def reach_moved(
     offset: np.ndarray,
 ) -> ReachResult:
     """A reach with everything, the base too, moved by an offset."""
-    environment = Environment(scenario, instance.translated(offset), p_WR=offset)
+    environment = Environment(scenario, instance.translated(offset), b0=offset)
     return environment.reach(p_WG + offset, x0 + offset, keep_states=True)
 
 
@@ -87,7 +87,7 @@ def test_a_base_aside_is_what_brings_a_goal_into_reach() -> None:
     far, aside = np.array([0.6, 0.9, 0.0]), np.array([0.0, 0.8, 0.0])
     nothing = make_clutter()
     assert Environment(scenario, nothing).reach(far, X0).outcome == "unreachable"
-    environment = Environment(scenario, nothing, p_WR=aside)
+    environment = Environment(scenario, nothing, b0=aside)
     result = environment.reach(far, X0 + aside)
     assert result.outcome == "reached"
     assert np.linalg.norm(result.trace.p_WE[-1] - far) < scenario.stop.success_distance_m
@@ -100,7 +100,7 @@ def test_a_trace_tells_where_the_base_and_the_objects_are_in_the_world() -> None
     base = np.array([0.05, -0.3, 0.0])
     scenario = free_space(0.2)
     clutter = make_clutter(cylinder(0.7, 0.4, movable=True), box(0.9, 0.0, (0.1, 0.1, 0.2)))
-    environment = Environment(scenario, clutter, p_WR=base)
+    environment = Environment(scenario, clutter, b0=base)
     trace = environment.reach(P_WG + base, X0 + base, keep_states=True).trace
     np.testing.assert_array_equal(trace.p_WR, base)
     np.testing.assert_allclose(trace.p_WO, [[0.7, 0.4]], atol=1e-12)
@@ -108,7 +108,7 @@ def test_a_trace_tells_where_the_base_and_the_objects_are_in_the_world() -> None
         np.testing.assert_allclose(state.p_WO, [[0.7, 0.4]], atol=1e-12)
     np.testing.assert_array_equal(trace.q[0], start_angles(scenario))
     np.testing.assert_allclose(
-        trace.p_WE, [scenario.arm().tip_position(q) + base for q in trace.q], atol=1e-12
+        trace.p_WE, [scenario.arm().calc_pose(q).p_RE + base for q in trace.q], atol=1e-12
     )
     np.testing.assert_allclose(trace.p_WE[0][:2], X0[:2] + base[:2], atol=1e-12)
 
@@ -119,7 +119,7 @@ def test_a_record_gives_positions_in_the_world_and_the_base() -> None:
     request = reach_request(scenario, (0.65, -0.3), y_m=-0.2, phi_deg=60.0)
     request = replace(request, start=Start(request.start.x0, np.array([*base, 0.0])))
     instance = scenario.sample_instance(request.stream, request.environment)
-    environment = Environment(scenario, instance, p_WR=np.array([*base, 0.0]))
+    environment = Environment(scenario, instance, b0=np.array([*base, 0.0]))
     result = environment.reach(request.goal, request.start.x0)
     record = make_record(request, result, 0.0)
     assert (record.base_x, record.base_y, record.after) == (*base, ())
@@ -162,6 +162,6 @@ def test_a_reach_through_an_aperture_touches_no_wall_where_there_is_room() -> No
     p_WA = scenario.sample_instance("training", 0).p_WA
     assert p_WA is not None
     base = np.array([0.0, p_WA[1, 1] + 0.2, 0.0])
-    environment = Environment(scenario, scenario.sample_instance("training", 0), p_WR=base)
+    environment = Environment(scenario, scenario.sample_instance("training", 0), b0=base)
     result = environment.reach(p_WA[1] + [0.2, 0.05, 0.0], np.array([*p_WA[1, :2], 0.3]))
     assert result.outcome == "reached"

@@ -58,7 +58,8 @@ def test_a_reach_finds_stems_upright_again_and_is_the_same(
 
 def test_stems_are_bent_the_same_wherever_the_base_stands(result: ReachResult) -> None:
     aside = np.array([0.0, 0.25, 0.0])
-    moved = Environment(SCENARIO, INSTANCE.translated(aside), p_WR=aside)
+    b0 = aside + [0.0, 0.0, SCENARIO.task.torso_m]
+    moved = Environment(SCENARIO, INSTANCE.translated(aside), b0=b0)
     x0 = X0.copy()
     x0[:3] += aside
     there = moved.reach(GOAL + aside, x0, keep_states=True)

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.kinematics import link_origins, only
 from support.starts import APERTURES, ARM, LINE, hand_pose_by_drake
 
 from lic_drake.reach.hand_poses import HandPoses
@@ -17,7 +18,7 @@ def test_the_papers_line_has_21_poses() -> None:
 @BOTH
 def test_every_pose_of_grid_and_lattice_is_one_that_the_arm_can_take(poses: HandPoses) -> None:
     for x0 in np.vstack([poses.grid, poses.lattice]):
-        q = ARM.solve_ik(x0)
+        q = only(ARM.solve_ik(x0))
         assert q is not None
         np.testing.assert_allclose(hand_pose_by_drake(q, np.zeros(2)), x0, atol=1e-9)
         assert np.all(q >= ARM.q_min - 1e-9)
@@ -36,7 +37,7 @@ def test_the_lattice_lacks_nothing_that_is_possible(poses: HandPoses) -> None:
         (round(yi, 9), round(phi_i, 9))
         for yi in y
         for phi_i in phi
-        if ARM.solve_ik(np.array([line.x_m, yi, phi_i])) is not None
+        if only(ARM.solve_ik(np.array([line.x_m, yi, phi_i]))) is not None
     }
     assert {(round(yi, 9), round(p, 9)) for _, yi, p in poses.lattice} == possible
 
@@ -44,9 +45,9 @@ def test_the_lattice_lacks_nothing_that_is_possible(poses: HandPoses) -> None:
 def test_the_whole_arm_is_behind_the_start_line_at_every_pose() -> None:
     for poses in POSES:
         for x0 in poses.lattice:
-            q = ARM.solve_ik(x0)
+            q = only(ARM.solve_ik(x0))
             assert q is not None
-            assert ARM.kinematics.link_origins(q)[:, 0].max() <= x0[0] + 1e-9
+            assert link_origins(ARM, q)[:, 0].max() <= x0[0] + 1e-9
 
 
 def test_poses_off_the_line_or_beyond_the_joint_limits_are_not_contained() -> None:
@@ -71,7 +72,7 @@ def test_between_the_ends_of_orientations_all_is_possible_and_beyond_them_soon_n
     for end, bound, sign in ((low, bounds[0], -1.0), (high, bounds[1], 1.0)):
         beyond = end + sign * 0.01
         at_the_bound = abs(end - bound) < 0.01
-        assert at_the_bound or ARM.solve_ik(np.array([x_m, y, beyond])) is None
+        assert at_the_bound or only(ARM.solve_ik(np.array([x_m, y, beyond]))) is None
 
 
 @pytest.mark.parametrize("poses", POSES, ids=["line", "apertures"])
@@ -94,4 +95,4 @@ def test_outside_the_range_of_positions_the_arm_can_take_nothing_but_at_its_edge
     for y in np.linspace(line.y_min_m, line.y_max_m, 161):
         if low_y - 0.005 <= y <= high_y + 0.005:
             continue
-        assert all(ARM.solve_ik(np.array([line.x_m, y, angle])) is None for angle in phi)
+        assert all(only(ARM.solve_ik(np.array([line.x_m, y, angle]))) is None for angle in phi)

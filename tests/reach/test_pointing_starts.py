@@ -10,14 +10,11 @@ from lic_drake.errors import ScenarioError
 from lic_drake.reach.environment import Environment
 from lic_drake.reach.pointing_starts import (
     PointingStarts,
-    mobile_positions,
     pointing_starts,
     standing_at,
 )
-from lic_drake.reach.scenario import Scenario, load_scenario
+from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.starts import make_starts, training_starts
-from lic_drake.robots.pr2 import Pr2Arm
-from lic_drake.robots.pr2_inverse import calc_preselection_cost, solve_pointing
 from lic_drake.scene.collision import CollisionChecker
 
 INSTANCE = SCENARIO.sample_instance("training", 0)
@@ -32,12 +29,6 @@ def apertures_of(instance: ClutterInstance) -> np.ndarray:
     return instance.p_WA
 
 
-def arm_of(scenario: Scenario, torso_m: float) -> Pr2Arm:
-    arm = scenario.arm(torso_m)
-    assert isinstance(arm, Pr2Arm)
-    return arm
-
-
 def assert_points_in(starts: PointingStarts, rows: np.ndarray) -> None:
     """The tool, by kinematics that do not read the model, is in an open aperture, along x."""
     grid = starts.grid
@@ -49,7 +40,7 @@ def assert_points_in(starts: PointingStarts, rows: np.ndarray) -> None:
         w, x, y, z = x0[3:]
         axis = [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)]
         np.testing.assert_allclose(axis, [1.0, 0.0, 0.0], atol=1e-9)
-        arm = arm_of(SCENARIO, b0[2])
+        arm = SCENARIO.arm()
         assert np.all(q >= arm.q_min - 1e-9)
         assert np.all(q <= arm.q_max + 1e-9)
 
@@ -83,15 +74,15 @@ def test_a_reach_begins_with_the_preselected_configuration() -> None:
 
 
 def test_no_other_configuration_without_contact_costs_less() -> None:
-    arm = arm_of(SCENARIO, 0.15)
+    arm = SCENARIO.arm()
     checker = CollisionChecker(arm, INSTANCE, SCENARIO.scene)
     for k in (0, 7, 13):
-        q = STILL.grid_angles[k]
-        assert not checker.touches(q)
-        others = solve_pointing(arm.kinematics, STILL.grid.x0[k, :3], np.array([1.0, 0.0, 0.0]))
-        cost = calc_preselection_cost(arm.kinematics, others)
-        least = calc_preselection_cost(arm.kinematics, q[None])[0]
-        assert all(checker.touches(row) for row in others[cost < least - 1e-12])
+        b0, q = STILL.grid.b0[k], STILL.grid_angles[k]
+        assert not checker.touches(b0, q)
+        (others,) = arm.solve_pointing(STILL.grid.x0[k : k + 1, :3] - b0, np.array([1.0, 0.0, 0.0]))
+        cost = arm.kinematics.calc_preselection_cost(others)
+        least = arm.kinematics.calc_preselection_cost(q[None])[0]
+        assert all(checker.touches(b0, row) for row in others[cost < least - 1e-12])
 
 
 def test_angles_are_those_of_the_grid_and_none_where_the_robot_cannot_start() -> None:
@@ -120,8 +111,7 @@ def test_blocked_apertures_have_no_start_and_no_arm_stands_in_what_blocks_them()
     here = [np.min(np.linalg.norm(starts.p_WA - x0[:3], axis=1)) < 1e-9 for x0 in whole.grid.x0]
     assert 0 < len(starts.grid) <= sum(here)
     for k in range(0, len(starts.grid), 29):
-        carried = mobile_positions(starts.grid.b0[k], starts.grid_angles[k : k + 1])
-        assert not starts.checker.touches(carried[0])
+        assert not starts.checker.touches(starts.grid.b0[k], starts.grid_angles[k])
 
 
 def test_a_robot_that_moves_with_its_environment_starts_alike() -> None:
@@ -146,7 +136,7 @@ def test_a_collection_tries_them_all_from_one_stand_an_environment() -> None:
 
 
 def test_robots_and_environments_without_such_starts_are_refused() -> None:
-    with pytest.raises(ScenarioError, match="need the robot pr2 and a board"):
+    with pytest.raises(ScenarioError, match="need a robot in space and a board"):
         pointing_starts(load_scenario("cylinder-aperture-clutter"), INSTANCE)
-    with pytest.raises(ScenarioError, match="need the robot pr2 and a board"):
+    with pytest.raises(ScenarioError, match="need a robot in space and a board"):
         pointing_starts(SCENARIO, replace(INSTANCE, p_WA=None))

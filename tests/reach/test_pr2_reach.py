@@ -1,11 +1,9 @@
 """Reaches of the PR2: in free space, against a fixed sphere, and into 40 floating ones."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from support.fake_reach import comparable
-from support.pr2_reaches import ARM, SCENARIO, pr2_of, spheres
+from support.pr2_reaches import ARM, SCENARIO, spheres
 
 from lic_drake.errors import RequestError, ScenarioError
 from lic_drake.experience.collect import CollectionRequest
@@ -19,13 +17,14 @@ from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.simulation import Simulation
 from lic_drake.reach.start import Start
 from lic_drake.reach.trace import ReachResult
+from lic_drake.robots.pr2 import Q_HOME
 
 PRECISE = load_scenario("sphere-aperture-clutter", "{stop: {success_distance_m: 0.01}}")
 FREE = Environment(PRECISE, spheres())
 BRIEF = load_scenario("sphere-aperture-clutter", "{stop: {timeout_s: 0.6}}")
 
 
-def reach_freely(p_WG: np.ndarray, q: np.ndarray = ARM.q_home) -> ReachResult:
+def reach_freely(p_WG: np.ndarray, q: np.ndarray = Q_HOME) -> ReachResult:
     return FREE.reach(p_WG, ARM.tip_pose(q))
 
 
@@ -48,7 +47,7 @@ def test_nearly_all_goals_that_the_arm_can_reach_are_reached_in_free_space() -> 
     rng = np.random.default_rng(0)
     count = reached = 0
     while count < 100:
-        goal = ARM.tip_position(rng.uniform(ARM.q_min, ARM.q_max))
+        goal = ARM.calc_pose(rng.uniform(ARM.q_min, ARM.q_max)).p_RE
         if goal[0] > 0.45 and 0.5 < goal[2] < 1.5:
             count += 1
             reached += reach_freely(goal).outcome == "reached"
@@ -56,12 +55,12 @@ def test_nearly_all_goals_that_the_arm_can_reach_are_reached_in_free_space() -> 
 
 
 def test_a_forearm_turns_on_beyond_half_a_turn() -> None:
-    q = ARM.q_home.copy()
+    q = Q_HOME.copy()
     q[[4, 5]] = 3.1, -1.6
     beyond = q.copy()
     beyond[4] += 1.2
     simulation = Simulation(make_reach_diagram(PRECISE, spheres()), PRECISE.scene)
-    result = simulate(simulation, PRECISE, q, ARM.tip_position(beyond))
+    result = simulate(simulation, PRECISE, q, ARM.calc_pose(beyond).p_RE)
     assert result.outcome == "reached"
     rolls = np.array(result.trace.q)[:, 4]
     assert rolls[0] == 3.1
@@ -70,20 +69,18 @@ def test_a_forearm_turns_on_beyond_half_a_turn() -> None:
 
 
 def test_against_a_fixed_sphere_the_force_settles_at_the_threshold() -> None:
-    p_WE, u_W = ARM.tip_position(ARM.q_home), ARM.tip_rotation(ARM.q_home)[:, 0]
+    x0 = ARM.tip_pose(Q_HOME) + np.pad([SCENARIO.task.torso_m], (2, 4))
+    p_WE, u_W = x0[:3], ARM.calc_pose(Q_HOME).R_RE[:, 0]
     # Its surface is 5 cm before the fingertips, which end 8.5 mm beyond the tool frame. With the
     # goal in its middle there is no way past it.
     centre = p_WE + (0.0085 + 0.05 + 0.05) * u_W
-    result = Environment(SCENARIO, spheres(centre)).reach(centre, ARM.tip_pose(ARM.q_home))
+    result = Environment(SCENARIO, spheres(centre)).reach(centre, x0)
     assert result.outcome == "stuck"
     np.testing.assert_allclose(result.trace.peak_force[-25:], 3.0, rtol=0.2)
 
 
-def test_the_torso_lifts_the_arm_and_has_its_range() -> None:
-    raised = pr2_of(replace(SCENARIO, task=replace(SCENARIO.task, torso_m=0.25)))
-    lift = raised.tip_position(ARM.q_home) - ARM.tip_position(ARM.q_home)
-    np.testing.assert_allclose(lift, [0.0, 0.0, 0.1], atol=1e-12)
-    with pytest.raises(ScenarioError, match="torso_m must be from"):
+def test_a_torso_beyond_its_range_is_refused() -> None:
+    with pytest.raises(ScenarioError, match="torso of pr2 must be from"):
         load_scenario("sphere-aperture-clutter", "{task: {torso_m: 0.0}}")
 
 
@@ -101,7 +98,7 @@ def test_a_reach_into_forty_spheres_gives_the_same_record_again() -> None:
     assert record.in_space
     np.testing.assert_array_equal(record.start.x0, x0)
     np.testing.assert_allclose(record.q_start, start.grid_angles[8], atol=1e-6)
-    final = pr2_of(BRIEF).raised(0.16).tip_pose(np.array(record.q_final)) + np.pad(p_WR, (0, 5))
+    final = ARM.tip_pose(np.array(record.q_final)) + np.pad([*p_WR, 0.16], (0, 4))
     names = ("x", "y", "z", "qw", "qx", "qy", "qz")
     np.testing.assert_allclose([getattr(record, f"final_{n}") for n in names], final, atol=1e-12)
     assert record.min_distance < np.linalg.norm(p_WG - x0[:3])

@@ -80,7 +80,7 @@ def test_a_goal_that_is_no_point_is_refused(goal: list[float]) -> None:
 
 def test_joint_angles_count_where_the_arm_has_a_choice() -> None:
     request = reach_request(SCENARIO)
-    start, (q,) = request.start, SCENARIO.arm().start_angles(request.start.x0)
+    start, (q,) = request.start, SCENARIO.arm().solve_ik(request.start.x0_R)
     assert replace(request, start=replace(start, q=q)).key == request.key
     assert replace(request, start=replace(start, q=q + 0.1)).key != request.key
     with pytest.raises(RequestError, match="planar-arm has 3 joint angles, the start has 2"):

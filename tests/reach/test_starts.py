@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import ks_2samp
+from support.kinematics import link_origins, only
 from support.starts import APERTURES, ARM, LINE, aperture_starts, assert_possible, dense_scan
 from support.worlds import gap_to_boxes
 
@@ -31,7 +32,7 @@ BARE = load_scenario(
 
 def angles_of(conditions: Starts) -> list[np.ndarray]:
     q = [
-        ARM.solve_ik(x0 - [*p_WR, 0.0])
+        only(ARM.solve_ik(x0 - [*p_WR, 0.0]))
         for x0, p_WR in zip(conditions.x0, conditions.p_WR, strict=True)
     ]
     assert all(item is not None for item in q)
@@ -134,7 +135,7 @@ def test_the_arm_keeps_clear_of_the_barrier_at_every_start() -> None:
         for x0, p_WR, q in zip(tried.x0, tried.p_WR, angles_of(tried), strict=True):
             assert gap_to_boxes(q, instance.translated(-np.append(p_WR, 0.0))) > 0.005
             # Joints and hand are behind the barrier or, the hand, in the middle of its opening.
-            x = ARM.kinematics.link_origins(q)[:, 0] + p_WR[0]
+            x = link_origins(ARM, q)[:, 0] + p_WR[0]
             assert np.all(x[:3] < front)
             assert x[3] == pytest.approx(x0[0])
 
@@ -144,7 +145,7 @@ def test_drakes_own_check_finds_no_start_in_the_barrier() -> None:
     tried = training_starts(BARE, "training", 0)
     for x0, p_WR in zip(tried.x0[::3], tried.p_WR[::3], strict=True):
         base = np.append(p_WR, 0.0)
-        environment = Environment(BARE, instance, p_WR=base)
+        environment = Environment(BARE, instance, b0=base)
         goal = base + [0.6, 0.0, 0.0]
         assert environment.reach(goal, x0).outcome == "timeout"
         # The same hand half an opening and half a hand's width aside stands in the barrier.

@@ -85,7 +85,7 @@ def test_a_sleeper_is_in_the_way_of_a_start() -> None:
     scenario = free_space()
     q = start_angles(scenario)
     elsewhere = q + [0.3, 0.0, 0.0]
-    tip = scenario.arm().tip_position(elsewhere)
+    tip = scenario.arm().calc_pose(elsewhere).p_RE
     simulation = WakingSimulation(scenario, make_clutter(cylinder(*tip[:2], movable=True)))
     simulation.begin(elsewhere, P_WG)
     np.testing.assert_array_equal(simulation.find_free(np.array([elsewhere, q])), q)

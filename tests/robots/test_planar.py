@@ -1,63 +1,59 @@
+"""The arm of the 2-D testbed: its numbers, and its inverse kinematics in closed form."""
+
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from pydrake.geometry import SceneGraph
-from pydrake.math import RigidTransform, RollPitchYaw
-from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import FixedOffsetFrame, JacobianWrtVariable
-from pydrake.systems.framework import Context
+from support.kinematics import link_origins
 
-from lic_drake.paths import models_dir
-from lic_drake.robots.planar import planar_arm
-from lic_drake.robots.planar_kinematics import wrap_angle
+from lic_drake.robots.kinematics import wrap_angle
+from lic_drake.robots.planar import PlanarKinematics, planar_arm
 
 ARM = planar_arm()
+LENGTHS = np.array([0.196, 0.334, 0.288])
 ANGLES = st.tuples(*(st.floats(low, high) for low, high in zip(ARM.q_min, ARM.q_max, strict=True)))
+START_X = 0.335
+# Feasible starts of the paper's two grids, y -> phi in degrees: 21 and 14 initial conditions.
+GRID_30 = {
+    -0.4: [-30, 0],
+    -0.3: [-30, 0, 30],
+    -0.2: [0, 30, 60],
+    -0.1: [30, 60, 90],
+    0.0: [30, 60, 90],
+    0.1: [60, 90],
+    0.2: [60, 90],
+    0.3: [60, 90],
+    0.4: [90],
+}
+GRID_45 = {-0.4: [0], -0.3: [0, 45], -0.2: [0, 45], -0.1: [45, 90], 0.0: [45, 90], 0.1: [45, 90]}
+GRID_45 |= {0.2: [90], 0.3: [90], 0.4: [90]}
 
 
-def make_plant() -> MultibodyPlant:
-    plant = MultibodyPlant(time_step=0.0)
-    scene_graph = SceneGraph()
+def make_plant() -> tuple[MultibodyPlant, SceneGraph]:
+    plant, scene_graph = MultibodyPlant(time_step=0.0), SceneGraph()
     plant.RegisterAsSourceForSceneGraph(scene_graph)
-    Parser(plant).AddModels(str(models_dir() / "planar_arm.urdf"))
-    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("base"))
-    plant.mutable_gravity_field().set_gravity_vector(np.zeros(3))
+    ARM.add_to_plant(plant)
     plant.Finalize()
-    return plant
+    return plant, scene_graph
 
 
-PLANT = make_plant()
-CONTEXT = PLANT.CreateDefaultContext()
+PLANT, SCENE_GRAPH = make_plant()
 
 
-def at(angles: tuple[float, ...]) -> tuple[np.ndarray, Context]:
-    q = np.array(angles)
-    PLANT.SetPositions(CONTEXT, q)
-    return q, CONTEXT
+def within_limits(q: np.ndarray, tolerance: float = 1e-9) -> bool:
+    return bool(np.all(q >= ARM.q_min - tolerance) and np.all(q <= ARM.q_max + tolerance))
 
 
-def test_the_base_is_welded_to_the_world_or_to_the_frame_that_is_given() -> None:
-    X_WF = RigidTransform(RollPitchYaw(0.0, 0.0, 0.7), np.array([0.3, -0.2, 0.1]))
-    for X_WR in (RigidTransform(), X_WF):
-        plant = MultibodyPlant(time_step=1e-3)
-        frame = plant.AddFrame(FixedOffsetFrame("mount", plant.world_frame(), X_WR))
-        arm = ARM.add_to_plant(plant, frame) if X_WR is X_WF else ARM.add_to_plant(plant)
-        plant.Finalize()
-        context = plant.CreateDefaultContext()
-        q = np.array([0.3, 0.4, 0.5])
-        plant.SetPositions(context, arm, q)
-        p_WE = plant.GetFrameByName("tip", arm).CalcPoseInWorld(context).translation()
-        np.testing.assert_allclose(p_WE, X_WR @ ARM.tip_position(q), atol=1e-12)
-
-
-def test_limits_gains_and_reach_are_those_of_the_testbed() -> None:
+def test_limits_gains_and_lengths_are_those_of_the_testbed() -> None:
     np.testing.assert_allclose(np.rad2deg(ARM.q_min), [-150.0, -63.0, 0.0], atol=1e-6)
     np.testing.assert_allclose(np.rad2deg(ARM.q_max), [150.0, 162.0, 159.0], atol=1e-6)
     np.testing.assert_array_equal(ARM.stiffness, [30.0, 20.0, 15.0])
     np.testing.assert_array_equal(ARM.damping, [15.0, 10.0, 8.0])
-    np.testing.assert_allclose(ARM.kinematics.link_lengths, [0.196, 0.334, 0.288], atol=1e-12)
+    assert isinstance(ARM.kinematics, PlanarKinematics)
+    np.testing.assert_allclose(ARM.kinematics.link_lengths, LENGTHS, atol=1e-12)
+    np.testing.assert_array_equal(ARM.p_RS, 0.0)
     assert ARM.reach_m == pytest.approx(0.818)
 
 
@@ -80,145 +76,117 @@ def test_masses_centres_of_mass_and_inertias_are_those_of_the_testbed(
     assert moment == pytest.approx(inertia, rel=1e-6)
 
 
-def test_the_inertias_are_those_of_solid_capsules() -> None:
-    for capsule in ARM.skin:
-        body = PLANT.GetBodyByName(capsule.link)
-        r, length, mass = capsule.radius, capsule.length, body.default_mass()
-        # Cylinder and two half balls of equal density, the balls by the parallel-axis theorem.
-        cylinder = mass * length / (length + 4.0 / 3.0 * r)
-        balls = mass - cylinder
-        offset = 0.5 * length + 3.0 / 8.0 * r
-        expected = cylinder * (length**2 / 12.0 + r**2 / 4.0)
-        expected += balls * (83.0 / 320.0 * r**2 + offset**2)
-        about_com = body.default_spatial_inertia().Shift(body.default_com())
-        assert about_com.CalcRotationalInertia().get_moments()[2] == pytest.approx(
-            expected, rel=2e-3
-        )
-
-
-def test_the_straight_arm_points_along_minus_y() -> None:
-    q, context = at((0.0, 0.0, 0.0))
-    X_WE = PLANT.GetFrameByName("tip").CalcPoseInWorld(context)
-    np.testing.assert_allclose(X_WE.translation(), [0.0, -0.818, 0.0], atol=1e-12)
-    np.testing.assert_allclose(ARM.tip_position(q), [0.0, -0.818, 0.0], atol=1e-12)
-
-
 def test_the_apex_of_the_last_cap_is_the_tip() -> None:
     last = ARM.skin[-1]
-    along = last.R_LC[:, 2]
-    apexes = last.p_LC + np.outer([1.0, -1.0], (0.5 * last.length + last.radius) * along)
+    radius, length = last.size
+    apexes = last.p_LS + np.outer([1.0, -1.0], (0.5 * length + radius) * last.R_LS[:, 2])
     np.testing.assert_allclose(sorted(apexes[:, 1]), [-0.288, 0.015], atol=1e-12)
 
 
-@given(ANGLES)
-def test_the_hand_pose_agrees_with_drake(angles: tuple[float, ...]) -> None:
-    q, context = at(angles)
-    X_WE = PLANT.GetFrameByName("tip").CalcPoseInWorld(context)
-    np.testing.assert_allclose(ARM.tip_position(q), X_WE.translation(), atol=1e-12)
-    x, y, phi = ARM.tip_pose(q)
-    np.testing.assert_allclose([x, y], X_WE.translation()[:2], atol=1e-12)
-    direction = X_WE.rotation().matrix()[:, 0]
-    np.testing.assert_allclose([np.cos(phi), np.sin(phi), 0.0], direction, atol=1e-12)
-
-
-@given(ANGLES)
-def test_the_tip_jacobian_agrees_with_drake(angles: tuple[float, ...]) -> None:
-    q, context = at(angles)
-    expected = PLANT.CalcJacobianTranslationalVelocity(
-        context,
-        JacobianWrtVariable.kV,
-        PLANT.GetFrameByName("tip"),
-        np.zeros(3),
-        PLANT.world_frame(),
-        PLANT.world_frame(),
-    )
-    np.testing.assert_allclose(ARM.tip_jacobian(q), expected, atol=1e-12)
-
-
-@given(ANGLES)
-def test_the_link_poses_agree_with_drake(angles: tuple[float, ...]) -> None:
-    q, context = at(angles)
-    for R_RL, p_RL, name in zip(*ARM.link_poses(q), ARM.link_names, strict=True):
-        X_WL = PLANT.GetBodyByName(name).EvalPoseInWorld(context)
-        np.testing.assert_allclose(R_RL, X_WL.rotation().matrix(), atol=1e-12)
-        np.testing.assert_allclose(p_RL, X_WL.translation(), atol=1e-12)
-
-
-@given(ANGLES, ANGLES)
-def test_answers_do_not_depend_on_what_was_asked_before(
-    angles: tuple[float, ...], others: tuple[float, ...]
-) -> None:
-    q, other = np.array(angles), np.array(others)
-    questions = (ARM.tip_position, ARM.tip_jacobian, lambda q: ARM.link_poses(q)[0])
-    first = [np.array(question(q)) for question in questions]
-    for question, answer in zip(questions, first, strict=True):
-        question(other)
-        np.testing.assert_array_equal(question(q), answer)
-
-
-def test_shared_answers_cannot_be_written_to() -> None:
-    q = np.array([0.1, 0.2, 0.3])
-    for answer in (ARM.tip_position(q), ARM.tip_jacobian(q), *ARM.link_poses(q)):
-        with pytest.raises(ValueError, match="read-only"):
-            answer[0] = 1.0
-
-
-POINTS = st.lists(
-    st.tuples(st.integers(0, 2), st.floats(-0.1, 0.1), st.floats(-0.4, 0.1)), max_size=5
-)
-
-
-@given(ANGLES, POINTS)
-def test_point_jacobians_agree_with_drake_and_with_the_closed_form(
-    angles: tuple[float, ...], points: list[tuple[int, float, float]]
-) -> None:
-    q, context = at(angles)
-    links = np.array([link for link, _, _ in points], dtype=int)
-    p_LQ = np.array([[x, y, 0.0] for _, x, y in points]).reshape(-1, 3)
-    poses = [PLANT.GetBodyByName(ARM.link_names[link]).EvalPoseInWorld(context) for link in links]
-    p_RQ = np.array([X @ p for X, p in zip(poses, p_LQ, strict=True)]).reshape(-1, 3)
-    jacobians = ARM.point_jacobians(q, links, p_RQ)
-    assert jacobians.shape == (len(points), 3, 3)
-    for link, p_L, p_R, jacobian in zip(links, p_LQ, p_RQ, jacobians, strict=True):
-        expected = PLANT.CalcJacobianTranslationalVelocity(
-            context,
-            JacobianWrtVariable.kV,
-            PLANT.GetBodyByName(ARM.link_names[link]).body_frame(),
-            p_L,
-            PLANT.world_frame(),
-            PLANT.world_frame(),
-        )
-        np.testing.assert_allclose(jacobian, expected, atol=1e-12)
-        np.testing.assert_allclose(
-            jacobian[:2], ARM.kinematics.point_jacobian(q, link, p_R[:2]), atol=1e-15
-        )
-
-
-def test_a_start_pose_brings_drakes_tip_frame_to_it() -> None:
-    x0 = np.array([0.335, -0.2, np.deg2rad(30.0)])
-    solution = ARM.solve_ik(x0)
-    assert solution is not None
-    _, context = at(tuple(solution))
-    X_WE = PLANT.GetFrameByName("tip").CalcPoseInWorld(context)
-    expected = RigidTransform(p=[0.335, -0.2, 0.0])
-    np.testing.assert_allclose(X_WE.translation(), expected.translation(), atol=1e-9)
-    assert wrap_angle(ARM.tip_pose(solution)[2] - x0[2]) == pytest.approx(0.0, abs=1e-9)
-
-
 def test_the_arm_ignores_contacts_between_its_own_links() -> None:
-    plant = MultibodyPlant(time_step=1e-3)
-    scene_graph = SceneGraph()
-    plant.RegisterAsSourceForSceneGraph(scene_graph)
-    ARM.add_to_plant(plant)
-    plant.Finalize()
-    assert scene_graph.model_inspector().GetCollisionCandidates() == set()
+    assert SCENE_GRAPH.model_inspector().GetCollisionCandidates() == set()
 
 
-def test_gravity_does_not_pull_at_the_arm() -> None:
-    plant = MultibodyPlant(time_step=1e-3)
-    arm = ARM.add_to_plant(plant)
-    plant.mutable_gravity_field().set_gravity_vector([9.81, 0.0, 0.0])
-    plant.Finalize()
-    context = plant.CreateDefaultContext()
-    assert not plant.is_gravity_enabled(arm)
-    np.testing.assert_array_equal(plant.CalcGravityGeneralizedForces(context), 0.0)
+@pytest.mark.parametrize(
+    ("q_deg", "tip", "phi_deg"),
+    [
+        ((0, 0, 0), (0.0, -0.818), -90),
+        ((-60, 45, 135), (-0.007, -0.277), 30),
+        ((-140, 100, 120), (-0.057, -0.156), -10),
+        ((-50, 70, 145), (0.039, -0.162), 75),
+        ((-100, 110, 110), (0.114, -0.151), 30),
+    ],
+)
+def test_known_postures_have_the_hand_where_the_authors_code_puts_it(
+    q_deg: tuple[float, ...], tip: tuple[float, ...], phi_deg: float
+) -> None:
+    pose = ARM.tip_pose(np.deg2rad(q_deg))
+    np.testing.assert_allclose(pose[:2], tip, atol=5e-4)
+    assert np.rad2deg(pose[2]) == pytest.approx(phi_deg, abs=1e-9)
+
+
+@given(st.floats(-100.0, 100.0))
+def test_a_wrapped_angle_is_the_same_direction_in_the_half_open_interval(angle: float) -> None:
+    wrapped = wrap_angle(angle)
+    assert -np.pi <= wrapped < np.pi
+    np.testing.assert_allclose(np.exp(1j * wrapped), np.exp(1j * angle), atol=1e-12)
+
+
+@given(ANGLES)
+def test_the_preferred_branch_is_the_elbow_bent_forward_where_that_is_legal(
+    angles: tuple[float, ...],
+) -> None:
+    q = np.array(angles)
+    # Nearer to a straight elbow the root of the cosine is less accurate than the limits' test.
+    assume(abs(q[1]) > 1e-3)
+    x0 = ARM.tip_pose(q)
+    (solution,) = ARM.solve_ik(x0)
+    difference = ARM.tip_pose(solution) - x0
+    np.testing.assert_allclose([*difference[:2], wrap_angle(difference[2])], 0.0, atol=1e-9)
+    if q[1] > 0.0 or solution[1] < 0.0:
+        np.testing.assert_allclose(solution, q, atol=1e-6)
+    if solution[1] < 0.0:
+        # The mirror of link 2 about the line from base to wrist, found without solve_ik.
+        a, b = LENGTHS[:2]
+        wrist_angle = np.arctan2(b * np.sin(q[1]), a + b * np.cos(q[1]))
+        mirrored = np.array(
+            [q[0] + 2.0 * wrist_angle, -q[1], q[2] + 2.0 * q[1] - 2.0 * wrist_angle]
+        )
+        origins = link_origins(ARM, mirrored)
+        np.testing.assert_allclose(origins[2:], link_origins(ARM, q)[2:], atol=1e-9)
+        mirrored = np.array([wrap_angle(angle) for angle in mirrored])
+        assert not within_limits(mirrored, tolerance=-1e-6)
+
+
+@given(st.floats(-2.5, 2.5), st.floats(0.1, 2.5))
+def test_a_straight_elbow_is_no_reason_to_refuse_a_pose(q1: float, q3: float) -> None:
+    x0 = ARM.tip_pose(np.array([q1, 0.0, q3]))
+    np.testing.assert_allclose(ARM.tip_pose(ARM.solve_ik(x0)[0])[:2], x0[:2], atol=1e-9)
+
+
+@given(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(-np.pi, np.pi - 1e-9))
+def test_a_pose_counts_as_infeasible_only_if_no_legal_configuration_reaches_it(
+    x: float, y: float, phi: float
+) -> None:
+    x0 = np.array([x, y, phi])
+    if len(ARM.solve_ik(x0)):
+        return
+    # Every legal elbow angle, densely: the wrist's distance from the base is all it decides.
+    wrist = x0[:2] - LENGTHS[2] * np.array([np.cos(phi), np.sin(phi)])
+    q2 = np.linspace(ARM.q_min[1], ARM.q_max[1], 20_001)
+    elbow = np.stack([LENGTHS[1] * np.sin(q2), -LENGTHS[0] - LENGTHS[1] * np.cos(q2)], axis=1)
+    near = np.abs(np.linalg.norm(elbow, axis=1) - np.linalg.norm(wrist)) < 1e-5
+    for angle, p in zip(q2[near], elbow[near], strict=True):
+        turn = wrap_angle(np.arctan2(wrist[1], wrist[0]) - np.arctan2(p[1], p[0]))
+        q = np.array([turn, angle, wrap_angle(phi + 0.5 * np.pi - turn - angle)])
+        assert not within_limits(q, tolerance=-1e-3)
+
+
+@pytest.mark.parametrize(("step_deg", "expected", "count"), [(30, GRID_30, 21), (45, GRID_45, 14)])
+def test_the_start_line_has_the_papers_number_of_initial_conditions(
+    step_deg: int, expected: dict[float, list[int]], count: int
+) -> None:
+    feasible = {
+        y: [
+            phi
+            for phi in range(-90, 91, step_deg)
+            if len(ARM.solve_ik(np.array([START_X, y, np.deg2rad(phi)])))
+        ]
+        for y in np.round(np.arange(-0.4, 0.41, 0.1), 1)
+    }
+    assert feasible == expected
+    assert sum(map(len, feasible.values())) == count
+
+
+@pytest.mark.parametrize(
+    ("y", "low", "high"),
+    [(-0.4, -33.0, 25.5), (-0.2, -9.5, 70.5), (0.0, 28.5, 90), (0.4, 67.5, 90)],
+)
+def test_feasible_orientations_are_one_interval_at_each_position(
+    y: float, low: float, high: float
+) -> None:
+    phi = np.arange(-90.0, 90.25, 0.25)
+    legal = [len(ARM.solve_ik(np.array([START_X, y, np.deg2rad(p)]))) for p in phi]
+    inside = phi[np.array(legal, dtype=bool)]
+    assert np.count_nonzero(np.diff(legal)) == (1 if high == 90.0 else 2)
+    np.testing.assert_allclose([inside[0], inside[-1]], [low, high], atol=0.5)

@@ -1,124 +1,148 @@
+"""The PR2's closed forms against published numbers alone (`support.pr2_reference`)."""
+
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from support.pr2_reference import link_poses, point_jacobian
 
-from lic_drake.robots.pr2 import Pr2Arm
-from lic_drake.robots.pr2_kinematics import calc_point_jacobians
+from lic_drake.robots.pr2 import Q_HOME, pr2_arm
+from lic_drake.robots.pr2_kinematics import Pr2Kinematics
 
-ARM = Pr2Arm()
+# R is the footprint of the base with the torso at 0.
+STAND = ((0.0, 0.0, 0.0), 0.0)
+ARM = pr2_arm()
+assert isinstance(ARM.kinematics, Pr2Kinematics)
+KINEMATICS = ARM.kinematics
+AHEAD = np.array([1.0, 0.0, 0.0])
 ANGLES = st.tuples(*(st.floats(low, high) for low, high in zip(ARM.q_min, ARM.q_max, strict=True)))
-STANDS = st.tuples(
-    st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(-4.0, 4.0)),
-    st.floats(0.0115, 0.305),
+INNER_ANGLES = st.tuples(
+    *(st.floats(low + 0.01, high - 0.01) for low, high in zip(ARM.q_min, ARM.q_max, strict=True))
 )
-Stand = tuple[tuple[float, float, float], float]
 
 
-@given(STANDS, ANGLES)
-def test_links_and_tool_are_where_the_published_numbers_put_them(
-    stand: Stand, angles: tuple[float, ...]
-) -> None:
-    pose = Pr2Arm(*stand).kinematics.calc_pose(*angles)
-    expected = link_poses(*stand, np.array(angles))
-    np.testing.assert_allclose(pose.R_RL, expected[:7, :3, :3], atol=1e-12)
-    np.testing.assert_allclose(pose.p_RL, expected[:7, :3, 3], atol=1e-12)
-    np.testing.assert_allclose(pose.p_RE, expected[7, :3, 3], atol=1e-12)
-
-
-@given(STANDS, ANGLES)
-def test_the_tools_jacobians_are_those_of_the_published_numbers(
-    stand: Stand, angles: tuple[float, ...]
-) -> None:
-    pose = Pr2Arm(*stand).kinematics.calc_pose(*angles)
-    p_RE = link_poses(*stand, np.array(angles))[7, :3, 3]
-    expected = point_jacobian(*stand, np.array(angles), 6, p_RE)
-    np.testing.assert_allclose(pose.Jw_E, expected[:3], atol=1e-12)
-    np.testing.assert_allclose(pose.Jv_E, expected[3:], atol=1e-11)
-
-
-@given(
-    STANDS,
-    ANGLES,
-    st.lists(st.tuples(st.integers(0, 6), *(st.floats(-0.4, 0.4),) * 3), max_size=5),
-)
-def test_point_jacobians_are_those_of_the_published_numbers(
-    stand: Stand, angles: tuple[float, ...], points: list[tuple[int, float, float, float]]
-) -> None:
-    q = np.array(angles)
-    links = np.array([link for link, *_ in points], dtype=np.intp)
-    poses = link_poses(*stand, q)
-    p_RQ = np.array(
-        [poses[link, :3, :3] @ p_LQ + poses[link, :3, 3] for link, *p_LQ in points]
-    ).reshape(-1, 3)
-    jacobians = calc_point_jacobians(Pr2Arm(*stand).kinematics.calc_pose(*angles), links, p_RQ)
-    assert jacobians.shape == (len(points), 3, 7)
-    for jacobian, link, p in zip(jacobians, links, p_RQ, strict=True):
-        expected = point_jacobian(*stand, q, link, p)[3:]
-        np.testing.assert_allclose(jacobian, expected, atol=1e-11)
+def tool_of(q: np.ndarray) -> np.ndarray:
+    return link_poses(*STAND, q)[7]
 
 
 @given(ANGLES)
-def test_the_tools_jacobian_is_the_derivative_of_its_place(angles: tuple[float, ...]) -> None:
-    q, step = np.array(angles), 1e-6
-    numeric = np.transpose(
-        [
-            (ARM.tip_position(q + delta) - ARM.tip_position(q - delta)) / (2.0 * step)
-            for delta in step * np.eye(7)
-        ]
-    )
-    np.testing.assert_allclose(ARM.tip_jacobian(q), numeric, atol=1e-8)
-
-
-@given(ANGLES, st.sampled_from([4, 6]), st.sampled_from([-2.0, 2.0]))
-def test_a_whole_turn_of_a_continuous_joint_changes_nothing(
-    angles: tuple[float, ...], joint: int, half_turns: float
+def test_links_tool_and_jacobians_are_those_of_the_published_numbers(
+    angles: tuple[float, ...],
 ) -> None:
     q = np.array(angles)
-    turned = q.copy()
-    turned[joint] += half_turns * np.pi
-    before, after = ARM.kinematics.calc_pose(*q), ARM.kinematics.calc_pose(*turned)
-    for one, other in zip(before, after, strict=True):
-        np.testing.assert_allclose(one, other, atol=1e-12)
+    pose = ARM.calc_pose(q)
+    expected = link_poses(*STAND, q)
+    np.testing.assert_allclose(pose.R_RL, expected[:7, :3, :3], atol=1e-12)
+    np.testing.assert_allclose(pose.p_RL, expected[:7, :3, 3], atol=1e-12)
+    np.testing.assert_allclose(pose.p_RE, expected[7, :3, 3], atol=1e-12)
+    J = point_jacobian(*STAND, q, 6, pose.p_RE)
+    np.testing.assert_allclose(pose.Jw_E, J[:3], atol=1e-12)
+    np.testing.assert_allclose(pose.Jv_E, J[3:], atol=1e-11)
+
+
+@given(ANGLES, st.lists(st.tuples(st.integers(0, 6), *(st.floats(-0.4, 0.4),) * 3), max_size=5))
+def test_point_jacobians_are_those_of_the_published_numbers(
+    angles: tuple[float, ...], points: list[tuple[int, float, float, float]]
+) -> None:
+    q = np.array(angles)
+    links = np.array([link for link, *_ in points], dtype=np.intp)
+    poses = link_poses(*STAND, q)
+    p_RQ = np.array(
+        [poses[link, :3, :3] @ p_LQ + poses[link, :3, 3] for link, *p_LQ in points]
+    ).reshape(-1, 3)
+    jacobians = ARM.point_jacobians(ARM.calc_pose(q), links, p_RQ)
+    assert jacobians.shape == (len(points), 3, 7)
+    for jacobian, link, p in zip(jacobians, links, p_RQ, strict=True):
+        expected = point_jacobian(*STAND, q, link, p)[3:]
+        np.testing.assert_allclose(jacobian, expected, atol=1e-11)
 
 
 @pytest.mark.parametrize("joint", [4, 6])
 def test_nothing_jumps_where_a_continuous_joint_passes_half_a_turn(joint: int) -> None:
-    below, above = ARM.q_home.copy(), ARM.q_home.copy()
+    below, above = Q_HOME.copy(), Q_HOME.copy()
     below[joint], above[joint] = np.pi - 1e-7, -np.pi + 1e-7
-    for one, other in zip(ARM.link_poses(below), ARM.link_poses(above), strict=True):
+    for one, other in zip(ARM.calc_pose(below), ARM.calc_pose(above), strict=True):
         np.testing.assert_allclose(one, other, atol=1e-6)
-    np.testing.assert_allclose(ARM.tip_jacobian(below), ARM.tip_jacobian(above), atol=1e-6)
 
 
 def test_the_straight_arm_points_forward_and_reaches_a_metre_from_its_pan_axis() -> None:
-    arm = Pr2Arm(torso_m=0.3)
-    np.testing.assert_allclose(
-        arm.tip_position(np.zeros(7)), [0.951, -0.188, 0.051 + 0.739675 + 0.3], atol=1e-12
-    )
-    np.testing.assert_allclose(arm.tip_rotation(np.zeros(7)), np.eye(3), atol=1e-15)
-    assert sum(arm.kinematics.lengths) == pytest.approx(1.001)
+    pose = ARM.calc_pose(np.zeros(7))
+    np.testing.assert_allclose(pose.p_RE, [0.951, -0.188, 0.051 + 0.739675], atol=1e-12)
+    np.testing.assert_allclose(pose.R_RE, np.eye(3), atol=1e-15)
+    assert ARM.reach_m == pytest.approx(1.001)
+    np.testing.assert_allclose(KINEMATICS.lengths, [0.1, 0.4, 0.321, 0.18], atol=1e-12)
+    np.testing.assert_allclose(ARM.p_RS, [-0.05, -0.188, 0.790675], atol=1e-12)
 
 
 @given(ANGLES)
-def test_no_tool_is_further_away_than_the_reach(angles: tuple[float, ...]) -> None:
-    assert np.linalg.norm(ARM.tip_position(np.array(angles)) - ARM.p_RS) <= ARM.reach_m + 1e-12
-
-
-@given(ANGLES, ANGLES)
-def test_answers_do_not_depend_on_what_was_asked_before(
-    angles: tuple[float, ...], others: tuple[float, ...]
+def test_every_configuration_of_a_pose_brings_the_tool_there_within_the_limits(
+    angles: tuple[float, ...],
 ) -> None:
-    q, other = np.array(angles), np.array(others)
-    questions = (ARM.tip_position, ARM.tip_jacobian, lambda q: ARM.link_poses(q)[0])
-    first = [np.array(question(q)) for question in questions]
-    for question, answer in zip(questions, first, strict=True):
-        question(other)
-        np.testing.assert_array_equal(question(q), answer)
+    x0 = ARM.tip_pose(np.array(angles))
+    assert x0[3] >= 0.0
+    solutions = ARM.solve_ik(x0)
+    assert np.all((solutions >= ARM.q_min) & (solutions <= ARM.q_max))
+    assert np.all(np.abs(solutions[:, [4, 6]]) <= np.pi)
+    assert len(np.unique(solutions.round(6), axis=0)) == len(solutions)
+    for q in solutions[:: max(1, len(solutions) // 5)]:
+        np.testing.assert_allclose(tool_of(q), tool_of(np.array(angles)), atol=1e-7)
 
 
-def test_shared_answers_cannot_be_written_to() -> None:
-    for answer in ARM.kinematics.calc_pose(*ARM.q_home):
-        with pytest.raises(ValueError, match="read-only"):
-            answer[0] = 1.0
+@given(INNER_ANGLES)
+def test_the_configuration_that_made_a_pose_is_the_nearest_to_it(
+    angles: tuple[float, ...],
+) -> None:
+    q = np.array(angles)
+    assume(abs(np.cos(q[2])) > 1e-3)  # Where the two rolls meet both lose half their digits.
+    x0 = ARM.tip_pose(q)
+    (nearest, *others) = ARM.solve_ik(x0 * [1.0, 1.0, 1.0, 3.0, 3.0, 3.0, 3.0], near=q)
+    assert np.abs(np.exp(1j * nearest) - np.exp(1j * q)).max() < 1e-7
+    assert all(row[0] == q[0] for row in others)
+
+
+@given(ANGLES)
+def test_every_configuration_that_points_does_so_within_the_limits(
+    angles: tuple[float, ...],
+) -> None:
+    X_RE = tool_of(np.array(angles))
+    (solutions,) = ARM.solve_pointing(X_RE[None, :3, 3], X_RE[:3, 0])
+    assert np.all((solutions >= ARM.q_min) & (solutions <= ARM.q_max))
+    np.testing.assert_array_equal(solutions[:, 6], 0.0)
+    for q in solutions[:: max(1, len(solutions) // 5)]:
+        np.testing.assert_allclose(tool_of(q)[:3, [0, 3]], X_RE[:3, [0, 3]], atol=1e-7)
+
+
+def test_a_place_before_the_robot_has_many_configurations_and_one_out_of_reach_none() -> None:
+    places = np.array([[0.6, -0.3, 0.8], ARM.p_RS + [1.002, 0.0, 0.0], [0.55, -0.1, 0.9]])
+    many, none, others = ARM.solve_pointing(places, AHEAD)
+    assert len(many) > 50
+    assert np.ptp(many[:, 0]) > 0.5
+    assert np.ptp([ARM.calc_pose(q).p_RL[3][2] for q in many]) > 0.1
+    assert none.shape == (0, 7)
+    # Places solved at once have the same bits as one by one.
+    np.testing.assert_array_equal(others, ARM.solve_pointing(places[2:], AHEAD)[0])
+    # The cheapest one lays the forearm along the way in.
+    along = np.array([ARM.calc_pose(q).R_RL[4][0, 0] for q in many])
+    assert along[0] == pytest.approx(along.max(), abs=1e-12)
+
+
+def test_the_straight_arm_is_found_although_its_rolls_are_arbitrary() -> None:
+    straight = ARM.p_RS + [1.001, 0.0, 0.0]
+    solutions = KINEMATICS.solve_pose(straight, np.eye(3), pan=np.zeros(1))
+    assert len(solutions) > 0
+    for q in solutions:
+        np.testing.assert_allclose(ARM.calc_pose(q).p_RE, straight, atol=1e-6)
+        np.testing.assert_allclose(ARM.calc_pose(q).R_RE, np.eye(3), atol=1e-6)
+
+
+@given(ANGLES, st.floats(0.1, 3.0), st.floats(0.1, 3.0))
+def test_the_preselection_cost_is_that_of_equation_5(
+    angles: tuple[float, ...], alpha: float, beta: float
+) -> None:
+    q = np.array(angles)
+    X = link_poses(*STAND, q)
+    # The elbow is the origin of link 4, the wrist that of link 6.
+    wrist, elbow = (abs(AHEAD @ (X[link, :3, 3] - X[7, :3, 3])) for link in (3 + 2, 3))
+    if alpha * wrist + beta * elbow > 1e-3:
+        (cost,) = KINEMATICS.calc_preselection_cost(q[None], alpha, beta)
+        assert cost == pytest.approx(1.0 / (alpha * wrist + beta * elbow), rel=1e-6)

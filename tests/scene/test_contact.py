@@ -57,7 +57,7 @@ def test_every_geometry_of_the_arm_is_compliant_and_every_object_is_rigid() -> N
 
 
 def test_friction_of_the_sliding_arm_on_a_fixed_object_is_measured_as_0_4() -> None:
-    R_RL, p_RL = ARM.link_poses(BENT)
+    R_RL, p_RL = ARM.calc_pose(BENT)[:2]
     normal, along = R_RL[2, :, 0], -R_RL[2, :, 1]
     centre = p_RL[2] + 0.2 * along + 0.025 * normal
     world = make_world(
@@ -68,7 +68,7 @@ def test_friction_of_the_sliding_arm_on_a_fixed_object_is_measured_as_0_4() -> N
             contact=ContactConfig(skin_modulus_Pa=1e7, skin_mesh_m=0.005, object_mesh_m=0.004),
         ),
     )
-    to_joints = np.linalg.pinv(ARM.tip_jacobian(BENT))
+    to_joints = np.linalg.pinv(ARM.calc_pose(BENT).Jv_E)
     world.set_equilibrium(BENT + to_joints @ (0.03 * normal))
     world.advance(3.0)
     world.set_equilibrium(BENT + to_joints @ (0.03 * normal + 0.06 * along))
@@ -108,24 +108,24 @@ def test_two_objects_meet_in_point_contact_and_their_friction_is_measured_as_0_2
 
 
 def test_the_arm_does_not_pass_through_a_fixed_object() -> None:
-    R_RL, p_RL = ARM.link_poses(BENT)
+    R_RL, p_RL = ARM.calc_pose(BENT)[:2]
     normal, along = R_RL[2, :, 0], -R_RL[2, :, 1]
     centre = p_RL[2] + 0.2 * along + 0.028 * normal
     contact = ContactConfig(skin_modulus_Pa=1e8, skin_mesh_m=0.005, object_mesh_m=0.004)
     world = make_world(
         BENT, make_clutter(cylinder(*centre[:2])), SceneConfig(time_step_s=0.005, contact=contact)
     )
-    world.set_equilibrium(BENT + np.linalg.pinv(ARM.tip_jacobian(BENT)) @ (0.08 * normal))
+    world.set_equilibrium(BENT + np.linalg.pinv(ARM.calc_pose(BENT).Jv_E) @ (0.08 * normal))
     world.advance(4.0)
-    R_RL, p_RL = ARM.link_poses(world.q)
+    R_RL, p_RL = ARM.calc_pose(world.q)[:2]
     gap = (centre - p_RL[2]) @ R_RL[2, :, 0] - 0.025
     assert -1e-3 < gap < 0.0
 
 
 def wall_ahead(distance: float) -> ClutterInstance:
     """A wall of a passage, 2 cm thick, across the way of the hand and in front of its tip."""
-    along = -ARM.link_poses(BENT)[0][2, :, 1]
-    centre = ARM.tip_position(BENT) + (distance + 0.01) * along
+    along = -ARM.calc_pose(BENT)[:2][0][2, :, 1]
+    centre = ARM.calc_pose(BENT).p_RE + (distance + 0.01) * along
     return box(*centre[:2], (0.02, 0.4, 0.2), yaw=float(np.arctan2(along[1], along[0])))
 
 
@@ -146,7 +146,7 @@ def test_a_thin_wall_stops_the_arm_and_bears_what_the_joints_press_with(
     speed: float, time_step: float
 ) -> None:
     # In a reach nothing moves faster than 0.3 m/s.
-    along = -ARM.link_poses(BENT)[0][2, :, 1]
+    along = -ARM.calc_pose(BENT)[:2][0][2, :, 1]
     clutter = make_clutter(wall_ahead(0.02))
     world = make_world(BENT, clutter, SceneConfig(time_step_s=time_step))
     if time_step == 0.0:
@@ -154,7 +154,7 @@ def test_a_thin_wall_stops_the_arm_and_bears_what_the_joints_press_with(
             SimulatorConfig(integration_scheme="cenic", accuracy=1e-4, max_step_size=0.01),
             world.simulator,
         )
-    to_joints = np.linalg.pinv(ARM.tip_jacobian(BENT)) @ along
+    to_joints = np.linalg.pinv(ARM.calc_pose(BENT).Jv_E) @ along
     q_d = BENT + 0.1 * to_joints
     world.set_equilibrium(q_d)
     plant = world.scene.plant
@@ -173,7 +173,7 @@ def test_a_thin_wall_stops_the_arm_and_bears_what_the_joints_press_with(
     v = plant.GetVelocities(world.plant_context, world.scene.arm)
     torque = ARM.stiffness * (q_d - world.q) - ARM.damping * v
     p_WC = np.array([info.contact_surface().centroid()])
-    (jacobian,) = ARM.point_jacobians(world.q, np.array([2]), p_WC)
+    (jacobian,) = ARM.point_jacobians(ARM.calc_pose(world.q), np.array([2]), p_WC)
     expected = np.linalg.pinv(jacobian.T) @ torque @ along
     assert expected > 10.0
     assert abs(info.F_Ac_W().translational() @ along) == pytest.approx(expected, rel=0.01)

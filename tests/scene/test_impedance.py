@@ -42,7 +42,7 @@ def test_a_force_on_the_tip_deflects_the_arm_by_the_joint_compliance(
     f_E_W = np.append(force, 0.0)
     world.push("link3", np.array([0.0, -0.288, 0.0]), f_E_W)
     world.advance(8.0)
-    expected = ARM.tip_jacobian(world.q).T @ f_E_W / K
+    expected = ARM.calc_pose(world.q).Jv_E.T @ f_E_W / K
     np.testing.assert_allclose(world.q - Q0, expected, atol=1e-6)
     assert np.max(np.abs(expected)) > 0.02
     world.push("link3", np.zeros(3), np.zeros(3))

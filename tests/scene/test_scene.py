@@ -5,7 +5,6 @@ from pydrake.systems.analysis import ApplySimulatorConfig, SimulatorConfig
 from pydrake.systems.framework import DiagramBuilder
 from support.worlds import ARM, box, cylinder, make_clutter, make_world
 
-from lic_drake.scene.furnish import place_robot
 from lic_drake.scene.scene import SceneConfig, add_scene, make_shape
 
 PARKED = np.deg2rad([-140.0, 100.0, 120.0])
@@ -66,19 +65,17 @@ def test_movable_objects_come_in_their_order_in_the_clutter_state() -> None:
 def test_a_robot_stands_at_the_origin_unless_it_is_placed() -> None:
     for p_WR in (np.zeros(3), np.array([0.1, -0.4, 0.0])):
         builder = DiagramBuilder()
-        placeable = bool(np.any(p_WR))
-        scene = add_scene(builder, ARM, CLUTTER, SceneConfig(), placeable=placeable)
+        mobile = bool(np.any(p_WR))
+        scene = add_scene(builder, ARM, CLUTTER, SceneConfig(), mobile=mobile)
         diagram = builder.Build()
         context = diagram.CreateDefaultContext()
         plant_context = scene.plant.GetMyMutableContextFromRoot(context)
-        assert scene.plant.num_positions(scene.arm) == 3
         assert scene.plant.num_positions(scene.clutter) == 4
-        if placeable:
-            place_robot(scene, context, p_WR)
         q = np.deg2rad([-30.0, 60.0, 50.0])
-        scene.plant.SetPositions(plant_context, scene.arm, q)
+        positions = ARM.positions(p_WR, q) if mobile else q
+        scene.plant.SetPositions(plant_context, scene.arm, positions)
         # The arm goes along; the clutter does not.
-        _, p_RL = ARM.link_poses(q)
+        _, p_RL = ARM.calc_pose(q)[:2]
         for i, name in enumerate(ARM.link_names):
             X_WL = scene.plant.EvalBodyPoseInWorld(
                 plant_context, scene.plant.GetBodyByName(name, scene.arm)
@@ -112,7 +109,7 @@ def test_each_shape_name_has_its_drake_shape(
 
 
 def test_the_continuous_plant_with_cenic_agrees_with_small_discrete_steps() -> None:
-    R_RL, p_RL = ARM.link_poses(np.deg2rad([-30.0, 60.0, 50.0]))
+    R_RL, p_RL = ARM.calc_pose(np.deg2rad([-30.0, 60.0, 50.0]))[:2]
     pushed = p_RL[2] - 0.2 * R_RL[2, :, 1] + 0.03 * R_RL[2, :, 0]
     results = []
     for time_step in (0.0, 0.0005):

@@ -103,7 +103,7 @@ def test_those_and_only_those_sleep_that_nothing_can_reach_before_the_next_look(
 
 @pytest.mark.parametrize("too_far", [False, True])
 def test_a_move_that_is_too_long_to_wake_up_in_time_is_told(too_far: bool) -> None:
-    distance = np.linalg.norm(ARM.tip_position(Q)[:2])
+    distance = np.linalg.norm(ARM.calc_pose(Q).p_RE[:2])
     angle = (1.2 if too_far else 0.6) * MAX_MOVE_M / distance
     monitor = SleepMonitor(CROWD, AXES, Q)
     woken = monitor.look(Q, np.zeros((0, 2)))
@@ -116,7 +116,7 @@ def test_a_move_that_is_too_long_to_wake_up_in_time_is_told(too_far: bool) -> No
 
 
 def test_a_pushed_object_that_moves_too_far_is_told() -> None:
-    tip = ARM.tip_position(Q)
+    tip = ARM.calc_pose(Q).p_RE
     monitor = SleepMonitor(make_clutter(cylinder(tip[0], tip[1] + 0.02, movable=True)), AXES, Q)
     assert monitor.look(Q, np.zeros((0, 2))) == [0]
     p_WO = tip[None, :2] + [0.0, 0.02]

@@ -24,7 +24,7 @@ def further_in(steps: int) -> list[np.ndarray]:
     path = [Q]
     for _ in range(steps):
         q = path[-1]
-        path.append(q + np.linalg.pinv(ARM.tip_jacobian(q)) @ [0.004, 0.0, 0.0])
+        path.append(q + np.linalg.pinv(ARM.calc_pose(q).Jv_E) @ [0.004, 0.0, 0.0])
     return path
 
 

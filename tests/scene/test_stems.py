@@ -12,7 +12,7 @@ from support.worlds import ARM, World, add_sensor, make_clutter, make_world
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.clutter.stems import Stems
 from lic_drake.reach.scenario import load_scenario
-from lic_drake.robots.pr2_head import RIGHT_ARM_AT_REST, LookingPr2
+from lic_drake.robots.pr2 import RIGHT_ARM_AT_REST, pr2_arm
 from lic_drake.scene.collision import CollisionChecker
 from lic_drake.scene.movables import CARRIAGE_SHARE
 from lic_drake.scene.scene import SceneConfig
@@ -154,8 +154,8 @@ def test_stems_and_leaves_touch_nothing_of_their_own_and_rest_where_they_grew() 
 
 
 def test_what_is_inside_is_unknown_to_a_robot_that_looks_for_a_free_start() -> None:
-    robot = LookingPr2((0.0, 0.0, 0.0), 0.15, 0.0)
+    robot, b0 = pr2_arm(), np.array([0.0, 0.0, 0.15])
     q = RIGHT_ARM_AT_REST
-    elbow = robot.link_poses(q)[1][3]
+    elbow = robot.calc_pose(q).p_RL[3] + b0
     stem = one_stem(elbow - [0.0, 0.0, 0.3], stiffness=np.inf)
-    assert not CollisionChecker(robot, with_stems(stem), SceneConfig()).touches(q)
+    assert not CollisionChecker(robot, with_stems(stem), SceneConfig()).touches(b0, q)

@@ -3,6 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.kinematics import only
 from support.pr2_reaches import SCENARIO
 
 from lic_drake.reach.pointing_starts import pointing_starts
@@ -17,9 +18,9 @@ def test_samples_are_within_reach_and_their_poses_are_those_of_the_arm_at_their_
     assert len(samples) > 100
     assert len(np.unique(samples.x0[:, :3], axis=0)) > 10
     for k in range(0, len(samples), 40):
-        arm = SCENARIO.arm(samples.torso_m[k])
-        x0_R = samples.x0[k] - [*samples.p_WR[k], *np.zeros(5)]
-        q = arm.solve_ik(x0_R)
+        arm = SCENARIO.arm()
+        x0_R = samples[k].x0_R
+        q = only(arm.solve_ik(x0_R))
         assert q is not None
         np.testing.assert_allclose(arm.tip_pose(q), x0_R, atol=1e-6)
 

@@ -79,8 +79,8 @@ def press(world: World | MujocoWorld, first: np.ndarray, force: float) -> tuple[
         first: Where it stands at first, shape (3,), metres.
         force: How hard to press, N.
     """
-    R_RL, _ = ARM.link_poses(BENT)
-    J = ARM.point_jacobians(BENT, np.array([2]), first[None])[0]
+    R_RL, _ = ARM.calc_pose(BENT)[:2]
+    J = ARM.point_jacobians(ARM.calc_pose(BENT), np.array([2]), first[None])[0]
     q_d = BENT + J.T @ (force * R_RL[2, :, 0]) / ARM.stiffness
     centre = first.copy()
     if isinstance(world, MujocoWorld):
@@ -93,9 +93,11 @@ def press(world: World | MujocoWorld, first: np.ndarray, force: float) -> tuple[
         world.advance(6.0)
         if len(world.objects):
             centre[:2] = world.objects[0]
-    R_RL, p_RL = ARM.link_poses(world.q)
+    R_RL, p_RL = ARM.calc_pose(world.q)[:2]
     normal, p_LC = R_RL[2, :, 0], centre - p_RL[2]
-    J = ARM.point_jacobians(world.q, np.array([2]), (centre - 0.01 * normal)[None])[0]
+    J = ARM.point_jacobians(ARM.calc_pose(world.q), np.array([2]), (centre - 0.01 * normal)[None])[
+        0
+    ]
     f_C = np.linalg.lstsq(J[:2].T, ARM.stiffness * (q_d - world.q), rcond=None)[0]
     return 0.025 - float(p_LC @ normal), float(f_C @ normal[:2])
 
@@ -105,7 +107,7 @@ def press(world: World | MujocoWorld, first: np.ndarray, force: float) -> tuple[
 def test_a_link_pressed_on_a_cylinder_is_about_as_stiff_as_in_drake(
     movable: bool, time_step_s: float
 ) -> None:
-    R_RL, p_RL = ARM.link_poses(BENT)
+    R_RL, p_RL = ARM.calc_pose(BENT)[:2]
     first = p_RL[2] - 0.2 * R_RL[2, :, 1] + 0.0252 * R_RL[2, :, 0]
     behind = first + 0.0202 * R_RL[2, :, 0]
     near = cylinder(*first[:2], movable=movable)

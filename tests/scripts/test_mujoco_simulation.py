@@ -47,11 +47,11 @@ def test_the_taxel_of_drakes_sensor_reads_the_force_that_the_joints_show(
     link: int, side: float
 ) -> None:
     q = np.deg2rad([-30.0, 60.0, 50.0])
-    R_RL, p_RL = ARM.link_poses(q)
+    R_RL, p_RL = ARM.calc_pose(q)[:2]
     normal = side * R_RL[link, :, 0]
-    p_RC = p_RL[link] + R_RL[link] @ (ARM.skin[link].p_LC + np.array([0.0, 0.02, 0.0]))
+    p_RC = p_RL[link] + R_RL[link] @ (ARM.skin[link].p_LS + np.array([0.0, 0.02, 0.0]))
     clutter = make_clutter(cylinder(*(p_RC + 0.0252 * normal)[:2]))
-    J = ARM.point_jacobians(q, np.array([link]), p_RC[None])[0]
+    J = ARM.point_jacobians(ARM.calc_pose(q), np.array([link]), p_RC[None])[0]
     q_d = q + J.T @ (5.0 * normal) / ARM.stiffness
 
     drake = make_world(q, clutter, SceneConfig(time_step_s=0.005), extend=add_sensor)

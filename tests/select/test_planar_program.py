@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from pydrake.autodiffutils import AutoDiffXd, InitializeAutoDiff
+from support.kinematics import only
 from support.select_surfaces import Bumps, random_model
 from support.starts import APERTURES, ARM, LINE
 
@@ -22,7 +23,7 @@ def test_costs_and_constraints_have_the_gradients_of_finite_differences(seed: in
         REGION,
         LINE.grid.x0[0],
         np.zeros(2),
-        ARM.solve_ik(LINE.grid.x0[0]),
+        only(ARM.solve_ik(LINE.grid.x0[0])),
     )
     x = np.concatenate(
         [
@@ -63,12 +64,12 @@ def test_joint_limits_bound_the_solution_although_the_surface_pulls_beyond_them(
     surface = Bumps(np.array([[0.3, -1.0]]), np.array([0.9]), np.array([0.3, 1.0]))
     model = SuccessModel(estimator=surface, features=PLANAR_LIC1)
     guess = np.array([REGION.lower[0], 0.3, np.deg2rad(75.0)])
-    q = ARM.solve_ik(guess)
+    q = only(ARM.solve_ik(guess))
     assert q is not None
     x0, p_WR = PlanarProgram(ARM.kinematics).solve(
         Objective(model=model, p_WG=GOAL), REGION, guess, np.zeros(2), q
     )
-    found = ARM.solve_ik(x0 + np.array([0.0, 0.0, 1e-4]))
+    found = only(ARM.solve_ik(x0 + np.array([0.0, 0.0, 1e-4])))
     assert found is not None
     assert x0[2] < guess[2]
     np.testing.assert_array_equal(p_WR, np.zeros(2))
@@ -86,7 +87,7 @@ def test_a_mobile_base_moves_and_the_hand_stays_in_the_aperture() -> None:
         region,
         guess.x0[0],
         guess.p_WR[0],
-        ARM.solve_ik(guess.in_R[0]),
+        only(ARM.solve_ik(guess.in_R[0])),
     )
     np.testing.assert_allclose(x0[:2], region.lower[:2], atol=1e-9)
     np.testing.assert_allclose([x0[1] - p_WR[1], x0[2]], [-0.23, 0.5], atol=2e-3)

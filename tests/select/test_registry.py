@@ -8,7 +8,7 @@ from support.starts import ARM, LINE
 from lic_drake.errors import RequestError
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.start import Start
-from lic_drake.robots.pr2 import Pr2Arm
+from lic_drake.robots.pr2 import pr2_arm
 from lic_drake.select.baselines import CostSelector, RandomSelector
 from lic_drake.select.planar_lic import PlanarLic
 from lic_drake.select.pointing_lic import PointingLic
@@ -57,27 +57,6 @@ def test_what_learns_needs_a_library(method: str) -> None:
         make_selector(method, ARM)
 
 
-def test_a_robot_without_a_selection_is_refused(columns: dict[str, np.ndarray]) -> None:
-    class Other:
-        name = "other"
-        p_RS = np.zeros(3)
-        torso_m = 0.0
-
-    with pytest.raises(RequestError, match="no selection is known for the robot 'other'"):
-        make_selector("knn", Other(), columns)  # type: ignore[arg-type]
-    # The baselines need the shoulder alone.
-    assert make_selector("rnd>cost", Other()).method == "rnd>cost"  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("torso_m", [0.0115, 0.2])
-def test_cost_knows_where_base_and_torso_are(torso_m: float) -> None:
-    selector = make_selector("cost", Pr2Arm(torso_m=torso_m))
-    assert isinstance(selector, CostSelector) and selector.b0 is not None
-    np.testing.assert_array_equal(selector.b0, [0.0, 0.0, torso_m])
-    planar = make_selector("cost", ARM)
-    assert isinstance(planar, CostSelector) and planar.b0 is None
-
-
 def test_only_the_plain_name_has_lic2(columns: dict[str, np.ndarray]) -> None:
     both, first = make_selector("knn", ARM, columns), make_selector("knn1", ARM, columns)
     assert isinstance(both, PlanarLic) and isinstance(first, PlanarLic)
@@ -122,7 +101,7 @@ def test_behind_a_board_there_is_no_lic_2_and_pairs_for_it_are_refused() -> None
     columns |= {"start_z": rng.uniform(-0.4, 0.4, n), "success": rng.random(n) < 0.5}
     columns |= {"environment": np.arange(n) // 6, "stream": np.full(n, "training")}
     category = "sphere-aperture-clutter"
-    selector = make_selector("knn", Pr2Arm(), columns, category=category)
+    selector = make_selector("knn", pr2_arm(), columns, category=category)
     assert isinstance(selector, PointingLic) and selector.second is None
     with pytest.raises(RequestError, match="sphere-aperture-clutter has no LIC-2"):
-        make_selector("knn", Pr2Arm(), columns, category=category, pairs=columns)
+        make_selector("knn", pr2_arm(), columns, category=category, pairs=columns)

@@ -9,7 +9,7 @@ from lic_drake.perception.cameras import take_views
 from lic_drake.perception.config import CameraConfig, CamerasConfig, ExternalConfig, HeadConfig
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.trace import SceneState
-from lic_drake.robots.pr2_head import RIGHT_ARM_AT_REST
+from lic_drake.robots.pr2 import RIGHT_ARM_AT_REST
 from lic_drake.show.film import SHRINK, FilmCamera, save_film
 
 

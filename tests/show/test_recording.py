@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.browser import assert_shows_a_scene, hue_share, visit
+from support.kinematics import link_origins
 from support.reaches import free_space, reach_request
 from support.worlds import cylinder, make_clutter
 
@@ -50,7 +51,7 @@ def recorded() -> tuple[list[ReachTrace], str]:
     clutter = make_clutter(cylinder(0.5, 0.35, movable=True), cylinder(0.9, 0.6))
     recording, traces = Recording(scenario, clutter), []
     for base in (np.array([0.0, -0.3, 0.0]), np.zeros(3), np.array([0.05, 0.2, 0.0])):
-        environment = Environment(scenario, clutter, p_WR=base)
+        environment = Environment(scenario, clutter, b0=base)
         result = environment.reach(P_WG + base, EASY_START + base, keep_states=True)
         assert (result.outcome, result.detail) == ("timeout", "")
         recording.add_reach(result.trace, P_WG + base)
@@ -61,14 +62,14 @@ def recorded() -> tuple[list[ReachTrace], str]:
 def test_the_frames_show_the_arm_where_it_was(recorded: tuple[list[ReachTrace], str]) -> None:
     traces, html = recorded
     frames = positions_of(html, LAST_LINK)
-    kinematics, begin = free_space().arm().kinematics, 0
+    arm, begin = free_space().arm(), 0
     for trace in traces:
         # 25 samples a second and as many frames, at their tick or, by rounding, the one before.
         for k, q in enumerate(trace.q):
             tick = begin + 10 * k
             assert (tick in frames) != (tick - 1 in frames)
             frame = frames[tick] if tick in frames else frames[tick - 1]
-            expected = [*(kinematics.link_origins(q)[2] + trace.p_WR[:2]), 0.0]
+            expected = [*(link_origins(arm, q)[2] + trace.p_WR[:2]), 0.0]
             np.testing.assert_allclose(frame, expected, atol=1e-9)
         # The next reach begins at a whole second, after a pause.
         begin += TICKS_PER_SECOND * int(np.ceil(trace.time_s[-1] + PAUSE_S))
@@ -92,7 +93,7 @@ def test_the_robot_moves_base_torso_and_arm_in_that_order_and_the_arm_goes_back(
     starts = pointing_starts(scenario, instance, standing_at(0.05, 0.2))
     b0, q, x0 = starts.grid.b0[7], starts.grid_angles[7], starts.grid.x0[7]
     p_WG = scenario.goals("training", 0)[4]
-    environment = Environment(scenario, instance, p_WR=np.array([0.0, 0.05, 0.0]), torso_m=0.2)
+    environment = Environment(scenario, instance, b0=np.array([0.0, 0.05, 0.2]))
     result = environment.reach(p_WG, x0, keep_states=True)
     assert result.outcome == "timeout"
 

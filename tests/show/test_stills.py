@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 from support.browser import hue_share
+from support.kinematics import link_origins
 from support.pr2_reaches import ARM as PR2
 from support.pr2_reaches import SCENARIO as SPHERES
 from support.pr2_reaches import felt, spheres
@@ -17,6 +18,7 @@ from lic_drake.evaluate.trial import Attempt
 from lic_drake.perception.image import CameraImage
 from lic_drake.reach.rollout import instance_of, make_record, simulate_request
 from lic_drake.reach.trace import ReachTrace, SceneState
+from lic_drake.robots.pr2 import Q_HOME
 from lic_drake.select.situation import Selection
 from lic_drake.show.figures import ShownTrial
 from lic_drake.show.stills import CAMERA, Still, StillCamera, draw_still, save_stills
@@ -149,7 +151,7 @@ def test_things_are_where_they_are_and_move(planar: StillCamera) -> None:
 
     # The object moves, and the arm with its base.
     p_WR, away = np.array([0.0, 0.3, 0.0]), np.array([0.3, 0.5])
-    p_WE = ARM.tip_position(Q) + p_WR
+    p_WE = ARM.calc_pose(Q).p_RE + p_WR
     moved = planar.take("", p_WR, at_rest(Q, away[None]))
     assert saturation(color_at(moved, movable)) < 0.1
     assert saturation(color_at(moved, np.array([*away, 0.099]))) > 0.3
@@ -159,10 +161,10 @@ def test_things_are_where_they_are_and_move(planar: StillCamera) -> None:
 
 def test_forces_point_from_objects_to_the_arm(planar: StillCamera) -> None:
     # The movable object, its radius 30 mm, 2 mm deep in the middle of the last link.
-    origins = ARM.kinematics.link_origins(Q)
+    origins = link_origins(ARM, Q)
     middle, along = 0.5 * (origins[-2] + origins[-1]), origins[-1] - origins[-2]
     aside = np.array([-along[1], along[0]]) / np.linalg.norm(along)
-    radius = ARM.skin[-1].radius
+    radius = ARM.skin[-1].size[0]
     for side in (1.0, -1.0):
         p_WO = middle + side * (radius + 0.03 - 0.002) * aside
         still = planar.take("", np.zeros(3), at_rest(Q, p_WO[None]))
@@ -177,13 +179,13 @@ def test_forces_point_from_objects_to_the_arm(planar: StillCamera) -> None:
 @pytest.mark.usefixtures("_renderer")
 def test_a_pr2_stands_where_it_stands_and_feels_what_its_skin_feels() -> None:
     b0 = np.array([0.0, 0.1, SPHERES.task.torso_m])
-    q = PR2.q_home
-    R_RL, p_RL = PR2.link_poses(q)
+    q = Q_HOME
+    R_RL, p_RL = PR2.calc_pose(q)[:2]
     # A ball 3 mm deep in the lower face of the forearm.
     forearm = PR2.link_names.index("r_forearm_roll_link")
     down = -R_RL[forearm][:, 2]
     hit = p_RL[forearm] + R_RL[forearm] @ np.array([0.236, 0.0, -0.0445])
-    ball, aside = hit + (0.05 - 0.003) * down, np.array([0.0, 0.1, 0.0])
+    ball, aside = hit + (0.05 - 0.003) * down, b0
     camera = StillCamera(SPHERES, spheres(ball + aside), np.array([0.84, -0.2, 0.9]))
     overview = camera.take("", b0, at_rest(q, np.zeros((0, 3))))
     _, sensor = felt(spheres(ball), q)

@@ -7,6 +7,7 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.patches import Circle, Polygon, Rectangle
+from support.kinematics import link_origins
 from support.reaches import free_space
 from support.worlds import ARM, box, corners, cylinder, make_clutter
 
@@ -35,7 +36,7 @@ def ax() -> Axes:
 def trace_of(*configurations: list[float]) -> ReachTrace:
     trace = ReachTrace()
     for k, q in enumerate(np.array(configurations)):
-        trace.append(0.04 * k, q, ARM.tip_position(q), np.zeros(1))
+        trace.append(0.04 * k, q, ARM.calc_pose(q).p_RE, np.zeros(1))
     return trace
 
 
@@ -132,7 +133,7 @@ def test_the_arm_is_drawn_at_the_beginning_and_at_the_end(ax: Axes) -> None:
     assert len(bars) == 6
     middles = np.array([bar.get_xy()[:4].mean(axis=0) for bar in bars]).reshape(2, 3, 2)
     for middle, q in zip(middles, (trace.q[0], trace.q[-1]), strict=True):
-        joints = ARM.kinematics.link_origins(q)
+        joints = link_origins(ARM, q)
         np.testing.assert_allclose(middle, 0.5 * (joints[1:] + joints[:-1]), atol=0.01)
     # The last capsule ends before the tip. The bars are as wide as the skin, 2 x 15 mm.
     outline = bars[0].get_xy()

@@ -4,19 +4,13 @@ import numpy as np
 
 from lic_drake.clutter.instance import ClutterInstance, make_objects
 from lic_drake.reach.diagram import ReachDiagram, make_reach_diagram
-from lic_drake.reach.scenario import Scenario, load_scenario
-from lic_drake.robots.pr2 import Pr2Arm
+from lic_drake.reach.scenario import load_scenario
+from lic_drake.robots.pr2 import pr2_arm
 
 SCENARIO = load_scenario("sphere-aperture-clutter")
 
 
-def pr2_of(scenario: Scenario) -> Pr2Arm:
-    arm = scenario.arm()
-    assert isinstance(arm, Pr2Arm)
-    return arm
-
-
-ARM = pr2_of(SCENARIO)
+ARM = pr2_arm()
 
 
 def spheres(*centres: np.ndarray, radius: float = 0.05, movable: bool = False) -> ClutterInstance:

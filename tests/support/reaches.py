@@ -9,6 +9,7 @@ from lic_drake.reach.diagram import ReachDiagram
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.scenario import Scenario, load_scenario
 from lic_drake.reach.start import Start
+from support.kinematics import only
 
 START_Y_M, START_PHI_DEG = 0.0, 60.0
 """A start of the grid from which a goal straight ahead is easy."""
@@ -52,7 +53,7 @@ def reach_request(
 
 def start_angles(scenario: Scenario) -> np.ndarray:
     """Joint angles of the easy start, shape (3,), radians."""
-    q = scenario.arm().solve_ik(reach_request(scenario).start.x0)
+    q = only(scenario.arm().solve_ik(reach_request(scenario).start.x0))
     assert q is not None
     return q
 

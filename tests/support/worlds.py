@@ -46,19 +46,19 @@ def corners(instance: ClutterInstance, i: int) -> np.ndarray:
 
 def gap_to_boxes(q: np.ndarray, instance: ClutterInstance) -> float:
     """Distance in the plane from the arm's skin to the boxes of an instance, negative inside."""
-    R_WL, p_WL = ARM.link_poses(q)
+    R_WL, p_WL = ARM.calc_pose(q)[:2]
     gaps = []
     for capsule in ARM.skin:
         link = ARM.link_names.index(capsule.link)
-        half = 0.5 * capsule.length * capsule.R_LC[:, 2]
-        p_LA = capsule.p_LC + np.linspace(-1.0, 1.0, 400)[:, np.newaxis] * half
+        half = 0.5 * capsule.size[1] * capsule.R_LS[:, 2]
+        p_LA = capsule.p_LS + np.linspace(-1.0, 1.0, 400)[:, np.newaxis] * half
         p_WA = (p_WL[link] + p_LA @ R_WL[link].T)[:, :2]
         for i in range(instance.num_objects):
             c, s = np.cos(instance.yaw[i]), np.sin(instance.yaw[i])
             outside = np.abs((p_WA - instance.p_WO[i, :2]) @ np.array([[c, -s], [s, c]]))
             outside -= 0.5 * instance.size[i, :2]
             distance = np.linalg.norm(np.maximum(outside, 0.0), axis=1)
-            gaps.append((distance + np.minimum(outside.max(axis=1), 0.0)).min() - capsule.radius)
+            gaps.append((distance + np.minimum(outside.max(axis=1), 0.0)).min() - capsule.size[0])
     return float(min(gaps))
 
 

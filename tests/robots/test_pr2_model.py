@@ -4,33 +4,43 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from pydrake.geometry import Box, Cylinder, SceneGraph
-from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 from support.pr2_reference import BODIES, FACTS
 
-from lic_drake.robots.pr2_description import (
+from lic_drake.errors import ScenarioError
+from lic_drake.paths import models_dir
+from lic_drake.robots.pr2 import (
+    CARRIAGE,
+    HEAD_CAMERA,
+    JOINTS,
     LEFT_ARM_AT_REST,
-    SOFT_LIMITS,
+    RIGHT_ARM_AT_REST,
     TORSO_RANGE_M,
-    add_pr2,
-    joint_names,
-    link_names,
-    read_pr2,
-    weld_joints,
+    make_pr2,
+    pr2_arm,
 )
+
+
+def joint_names(side: str = "r") -> tuple[str, ...]:
+    return tuple(f"{side}_{joint}_joint" for joint in JOINTS)
+
+
+def link_names(side: str = "r") -> tuple[str, ...]:
+    return tuple(f"{side}_{joint}_link" for joint in JOINTS)
+
 
 RIGHT = [FACTS["joints"][name] for name in joint_names()]
 
 
-def make_plant(
-    welds: dict[str, float] | None = None,
-) -> tuple[MultibodyPlant, SceneGraph, ModelInstanceIndex]:
+def make_plant() -> tuple[MultibodyPlant, SceneGraph, ModelInstanceIndex]:
+    """The model file with all its joints."""
     plant, scene_graph = MultibodyPlant(time_step=1e-3), SceneGraph()
     plant.RegisterAsSourceForSceneGraph(scene_graph)
-    pr2 = add_pr2(plant)
+    (pr2,) = Parser(plant).AddModels(str(models_dir() / "pr2" / "pr2.urdf"))
     plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("base_link_for_rbt_compat"))
-    weld_joints(plant, pr2, welds or {})
     plant.Finalize()
     return plant, scene_graph, pr2
 
@@ -73,33 +83,24 @@ def test_every_joint_lies_where_the_published_numbers_say(name: str) -> None:
     assert X_JC.IsNearlyEqualTo(RigidTransform(), 1e-12)
 
 
-def test_the_arm_has_the_published_limits_and_efforts() -> None:
-    pr2 = read_pr2()
-    np.testing.assert_array_equal(pr2.q_min, or_infinite([j["lower"] for j in RIGHT], -1.0))
-    np.testing.assert_array_equal(pr2.q_max, or_infinite([j["upper"] for j in RIGHT], 1.0))
-    np.testing.assert_array_equal(pr2.effort_limit, [j["effort_limit"] for j in RIGHT])
-    np.testing.assert_array_equal(pr2.velocity_limit, [j["velocity_limit"] for j in RIGHT])
-    np.testing.assert_allclose(pr2.lengths, [0.1, 0.4, 0.321, 0.18], atol=1e-12)
-    np.testing.assert_allclose(pr2.p_FA, [-0.05, -0.188, 0.790675], atol=1e-12)
+def test_the_right_arm_has_the_published_efforts_and_the_simulated_controllers_gains() -> None:
+    actuators = [PLANT.GetJointActuatorByName(name) for name in joint_names()]
+    efforts = [actuator.effort_limit() for actuator in actuators]
+    np.testing.assert_array_equal(efforts, [joint["effort_limit"] for joint in RIGHT])
+    # pr2sim_arm_controllers of gt-ros-pkg/hrl (hrl_gazebo_plugin).
+    arm = pr2_arm()
+    np.testing.assert_array_equal(arm.stiffness, [90.0, 80.0, 20.0, 22.0, 20.0, 27.5, 20.0])
+    np.testing.assert_array_equal(arm.damping, [10.0, 10.0, 2.0, 1.0, 1.0, 2.0, 2.0])
+    assert PLANT.num_actuators() == 7
 
 
-def test_the_soft_limits_are_the_published_ones_within_the_hard_ones() -> None:
-    low, high = np.array(SOFT_LIMITS).T
-    np.testing.assert_allclose(low, or_infinite([j["soft_lower"] for j in RIGHT], -1.0))
-    np.testing.assert_allclose(high, or_infinite([j["soft_upper"] for j in RIGHT], 1.0))
+def test_postures_and_torso_are_within_the_soft_limits() -> None:
     torso = FACTS["joints"]["torso_lift_joint"]
     assert TORSO_RANGE_M == (torso["soft_lower"], torso["soft_upper"])
-    left = [FACTS["joints"][name] for name in joint_names("l")]
-    rest = np.array(LEFT_ARM_AT_REST)
-    assert np.all(rest >= or_infinite([j["soft_lower"] for j in left], -1.0))
-    assert np.all(rest <= or_infinite([j["soft_upper"] for j in left], 1.0))
-
-
-def test_the_impedance_gains_are_those_of_the_simulated_controllers() -> None:
-    # pr2sim_arm_controllers of gt-ros-pkg/hrl (hrl_gazebo_plugin).
-    np.testing.assert_array_equal(read_pr2().stiffness, [90.0, 80.0, 20.0, 22.0, 20.0, 27.5, 20.0])
-    np.testing.assert_array_equal(read_pr2().damping, [10.0, 10.0, 2.0, 1.0, 1.0, 2.0, 2.0])
-    assert PLANT.num_actuators() == 7
+    for side, rest in (("l", np.array(LEFT_ARM_AT_REST)), ("r", RIGHT_ARM_AT_REST)):
+        joints = [FACTS["joints"][name] for name in joint_names(side)]
+        assert np.all(rest >= or_infinite([joint["soft_lower"] for joint in joints], -1.0))
+        assert np.all(rest <= or_infinite([joint["soft_upper"] for joint in joints], 1.0))
 
 
 @pytest.mark.parametrize("name", FACTS["moving_bodies"])
@@ -158,7 +159,7 @@ def test_the_collision_shapes_are_the_fitted_ones_on_both_arms_and_the_body() ->
     # The model keeps the shapes of the head, which the facts count to the torso, on its own link.
     found["torso_lift_link"] = sorted(found["torso_lift_link"] + shapes_of("head"))
     assert found == {name: sorted(shapes) for name, shapes in expected.items()}
-    assert len(read_pr2().surface) == sum(len(expected[name]) for name in link_names())
+    assert len(pr2_arm().skin) == sum(len(expected[name]) for name in link_names())
 
 
 def test_pairs_that_touch_by_design_and_neighbours_are_filtered() -> None:
@@ -198,19 +199,50 @@ def test_the_frames_of_rigid_links_keep_their_published_names() -> None:
         assert X_PE.IsNearlyEqualTo(expected, 1e-12)
 
 
-def test_welds_stand_where_the_joints_would_have() -> None:
-    positions = {"x": 0.4, "y": -0.3, "theta": 2.0, "torso_lift_joint": 0.2}
+def test_held_joints_are_where_the_joints_would_be() -> None:
+    heading, height = 2.0, 0.2
+    held = MultibodyPlant(time_step=1e-3)
+    arm = make_pr2(heading)
+    model = arm.add_to_plant(held, mobile=True)
+    held.Finalize()
+    assert held.num_positions() == 3 + 7
+    fixed, context = held.CreateDefaultContext(), PLANT.CreateDefaultContext()
+    held.SetPositions(fixed, model, arm.positions(np.array([0.4, -0.3, height]), np.zeros(7)))
+    positions = dict(zip((*CARRIAGE, "theta"), (0.4, -0.3, height, heading), strict=True))
     positions |= dict(zip(joint_names("l"), LEFT_ARM_AT_REST, strict=True))
-    welded, _, _ = make_plant(positions)
-    assert welded.num_positions() == 7
-    context, fixed = PLANT.CreateDefaultContext(), welded.CreateDefaultContext()
     q = np.zeros(PLANT.num_positions())
     for name, position in positions.items():
         q[PLANT.GetJointByName(name).position_start()] = position
     PLANT.SetPositions(context, q)
     for name in ("base_link", "torso_lift_link", "l_wrist_roll_link", "r_gripper_tool_frame"):
         X_WF = PLANT.GetFrameByName(name).CalcPoseInWorld(context)
-        assert welded.GetFrameByName(name).CalcPoseInWorld(fixed).IsNearlyEqualTo(X_WF, 1e-12)
+        assert held.GetFrameByName(name).CalcPoseInWorld(fixed).IsNearlyEqualTo(X_WF, 1e-12)
+
+
+def camera_pose(tilt_deg: float) -> RigidTransform:
+    plant = MultibodyPlant(time_step=1e-3)
+    make_pr2(head_tilt_deg=tilt_deg).add_to_plant(plant)
+    plant.Finalize()
+    return plant.GetFrameByName(HEAD_CAMERA).CalcPoseInWorld(plant.CreateDefaultContext())
+
+
+@pytest.mark.parametrize("tilt_deg", [0.0, -15.0, 60.0])
+def test_a_tilted_head_turns_its_camera_about_the_tilt_axis(tilt_deg: float) -> None:
+    # In R torso_lift_link is 0.05 m behind the base's centre, 0.790675 m above the floor.
+    p_RT = np.array([-0.05, 0.0, 0.790675])
+    p_RA, p_RC = p_RT + [0.05093, 0.0, 0.38145], p_RT + [0.128, 0.0, 0.478]
+    turn = RotationMatrix.MakeYRotation(np.deg2rad(tilt_deg)).matrix()
+    X_RC = camera_pose(tilt_deg)
+    # Level, it looks along x with the image upright; down is positive.
+    level = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+    np.testing.assert_allclose(X_RC.rotation().matrix(), turn @ level, atol=1e-9)
+    np.testing.assert_allclose(X_RC.translation(), p_RA + turn @ (p_RC - p_RA), atol=1e-9)
+
+
+@pytest.mark.parametrize("tilt_deg", [-22.0, 75.0])
+def test_a_head_does_not_look_further_than_it_can(tilt_deg: float) -> None:
+    with pytest.raises(ScenarioError, match=r"head_tilt_deg must be from -21.27 to 74.27"):
+        make_pr2(head_tilt_deg=tilt_deg)
 
 
 def test_the_model_is_read_without_a_warning(caplog: pytest.LogCaptureFixture) -> None:

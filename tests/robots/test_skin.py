@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydrake.math import RollPitchYaw
 
-from lic_drake.robots.skin_shape import SkinShape
+from lic_drake.robots.skin import SkinShape
 
 EDGE = st.floats(0.005, 0.5)
 ANGLE = st.floats(-3.0, 3.0)
@@ -25,9 +25,9 @@ def make_shape(
 def distance_to_capsule(shape: SkinShape, p_LQ: np.ndarray) -> np.ndarray:
     """Distances of points from the surface of the enclosing capsule, negative inside."""
     capsule = shape.enclosing_capsule()
-    p_CQ = (p_LQ - capsule.p_LC) @ capsule.R_LC
-    p_CQ[:, 2] -= np.clip(p_CQ[:, 2], -0.5 * capsule.length, 0.5 * capsule.length)
-    return np.linalg.norm(p_CQ, axis=1) - capsule.radius
+    p_CQ = (p_LQ - capsule.p_LS) @ capsule.R_LS
+    p_CQ[:, 2] -= np.clip(p_CQ[:, 2], -0.5 * capsule.size[1], 0.5 * capsule.size[1])
+    return np.linalg.norm(p_CQ, axis=1) - capsule.size[0]
 
 
 @given(st.tuples(EDGE, EDGE, EDGE), st.tuples(ANGLE, ANGLE, ANGLE))
@@ -56,8 +56,8 @@ def test_the_capsule_of_a_cylinder_touches_its_side_and_rims(
 def test_the_axis_of_a_boxes_capsule_is_its_longest_edge(axis: int) -> None:
     size = tuple(0.3 if i == axis else 0.04 for i in range(3))
     capsule = make_shape("box", size).enclosing_capsule()
-    np.testing.assert_allclose(np.abs(capsule.R_LC[:, 2]), np.eye(3)[axis], atol=1e-15)
-    np.testing.assert_allclose(capsule.R_LC @ capsule.R_LC.T, np.eye(3), atol=1e-15)
-    assert np.linalg.det(capsule.R_LC) == pytest.approx(1.0)
-    assert capsule.length == 0.3
-    assert capsule.radius == pytest.approx(0.02 * np.sqrt(2.0))
+    np.testing.assert_allclose(np.abs(capsule.R_LS[:, 2]), np.eye(3)[axis], atol=1e-15)
+    np.testing.assert_allclose(capsule.R_LS @ capsule.R_LS.T, np.eye(3), atol=1e-15)
+    assert np.linalg.det(capsule.R_LS) == pytest.approx(1.0)
+    assert capsule.size[1] == 0.3
+    assert capsule.size[0] == pytest.approx(0.02 * np.sqrt(2.0))

@@ -1,0 +1,264 @@
+"""Kinematics of a serial arm: numerical by default; closed forms override single methods.
+
+Frame R is the arm's base frame, which b0 carries; frame E is the tip, which points along Ex. A hand
+pose x0 is (x, y, phi) for an arm in the plane, else position and quaternion (w, x, y, z) of E.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from pydrake.common.eigen_geometry import Quaternion
+from pydrake.math import RotationMatrix
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Frame, JacobianWrtVariable
+from scipy.spatial.transform import Rotation
+
+from lic_drake.types import BoolVector, Vector
+
+IK_TOLERANCE = 1e-10
+"""Largest error of a numerical inverse kinematics solution, metres and radians."""
+
+LIMIT_TOLERANCE = 1e-9
+"""Joint angles this far beyond a limit, radians, are taken for rounding."""
+
+_MAX_NEWTON_STEPS = 40
+_LARGEST_STEP = 0.5
+_DAMPING = 1e-8
+_NUM_SEEDS = 32
+_DISTINCT_RAD = 1e-5
+
+
+class ArmPose(NamedTuple):
+    """Where the arm is at one configuration of m joints; all arrays are read-only.
+
+    Attributes:
+        R_RL: Rotations of the k skin links, shape (k, 3, 3).
+        p_RL: Their origins, shape (k, 3), metres.
+        p_RE: Position of the tip, shape (3,), metres.
+        R_RE: Rotation of the tip frame, shape (3, 3).
+        Jv_E: Translational Jacobian of the tip, shape (3, m), m/rad.
+        Jw_E: Angular Jacobian of the tip, the joint axes, shape (3, m).
+        turn: Matrix, shape (3, 3 m), with p_RQ @ turn = the axes' cross products with p_RQ.
+        moment: The cross products of each axis with a point on it, shape (3, m), metres.
+    """
+
+    R_RL: Vector
+    p_RL: Vector
+    p_RE: Vector
+    R_RE: Vector
+    Jv_E: Vector
+    Jw_E: Vector
+    turn: Vector
+    moment: Vector
+
+
+def cross_matrix(axes: Vector) -> Vector:
+    """Returns `ArmPose.turn` of joint axes, shape (3, m)."""
+    x, y, z = axes
+    zero = np.zeros_like(x)
+    return np.array([[zero, z, -y], [-z, zero, x], [y, -x, zero]]).reshape(3, -1)
+
+
+def wrap_angle(angle: float) -> float:
+    """Returns the angle wrapped to [-pi, pi), radians."""
+    return float((angle + np.pi) % (2.0 * np.pi) - np.pi)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArmGeometry:
+    """What kinematics need of an arm's model.
+
+    Attributes:
+        is_planar: Whether the arm moves in the plane z = 0 and hand poses are (x, y, phi).
+        q_min: Lower joint limits, shape (m,), radians.
+        q_max: Upper joint limits, shape (m,), radians.
+        p_RJ: Origins of the m joints and of the tip at q = 0, shape (m + 1, 3), metres.
+    """
+
+    is_planar: bool
+    q_min: Vector
+    q_max: Vector
+    p_RJ: Vector
+
+
+class Kinematics:
+    """Forward and inverse kinematics; subclasses give `calc_pose` and may override the rest."""
+
+    def __init__(self, arm: ArmGeometry) -> None:
+        self.arm = arm
+        self.q_min, self.q_max = arm.q_min, arm.q_max
+
+    def calc_pose(self, q: Vector) -> ArmPose:
+        """Returns the arm's pose at joint angles q, shape (m,), radians."""
+        raise NotImplementedError
+
+    def tip_pose(self, q: Vector) -> Vector:
+        """Returns x0: (x, y, phi) with phi in [-pi, pi), or p_RE and quaternion with w >= 0."""
+        pose = self.calc_pose(q)
+        if self.arm.is_planar:
+            return np.array([*pose.p_RE[:2], np.arctan2(pose.R_RE[1, 0], pose.R_RE[0, 0])])
+        wxyz = RotationMatrix(pose.R_RE).ToQuaternion().wxyz()
+        return np.concatenate((pose.p_RE, wxyz if wxyz[0] >= 0.0 else -wxyz))
+
+    def solve_ik(self, x0: Vector, near: Vector | None = None) -> Vector:
+        """Returns configurations within the joint limits for a hand pose, shape (n, m).
+
+        Args:
+            x0: Hand pose in R; a quaternion may have any positive norm.
+            near: Joint angles near which to search, shape (m,), radians.
+
+        Returns:
+            Those of lowest preselection cost first or, with `near`, the nearest first. A redundant
+            arm has infinitely many, of which this is a sample.
+        """
+        p_RE, R_RE = rigid_pose(x0)
+
+        def missing(pose: ArmPose) -> tuple[Vector, Vector]:
+            turn = Rotation.from_matrix(R_RE @ pose.R_RE.T).as_rotvec()
+            error, J = np.append(p_RE - pose.p_RE, turn), np.vstack([pose.Jv_E, pose.Jw_E])
+            rows = [0, 1, 5] if self.arm.is_planar else slice(None)
+            return error[rows], J[rows]
+
+        if near is not None:
+            found = self._newton(missing, [near, *(0.5 * (near + self._seeds[:8]))])
+            return found[np.argsort(np.linalg.norm(found - near, axis=1), kind="stable")]
+        return self._cheapest_first(self._newton(missing, self._seeds))
+
+    def solve_pointing(self, p_RE: Vector, u_R: Vector) -> list[Vector]:
+        """Returns configurations with the tip at places and pointing one way, k times (n, m).
+
+        Args:
+            p_RE: Places of the tip, shape (k, 3), metres.
+            u_R: Unit vector along which the tip is to point, shape (3,).
+
+        Returns:
+            For each place those within the joint limits, of lowest preselection cost first.
+        """
+        return [self._point(p, u_R) for p in p_RE]
+
+    def calc_preselection_cost(self, q: Vector) -> Vector:
+        """Returns the cost of Eq. (5) of configurations, shape (n, m), as shape (n,), 1/m.
+
+        C = 1 / (|x'p_tw| + |x'p_te|) with p_tw and p_te from the tool to wrist and elbow and x from
+        the robot to the clutter: low where hand and forearm point into the clutter. Here the wrist
+        is the last link's origin and the elbow the middle link's.
+        """
+        behind = np.empty(len(q))
+        for i, row in enumerate(q):
+            pose = self.calc_pose(row)
+            wrist, elbow = pose.p_RL[-1], pose.p_RL[len(pose.p_RL) // 2]
+            behind[i] = abs(pose.p_RE[0] - wrist[0]) + abs(pose.p_RE[0] - elbow[0])
+        return 1.0 / np.maximum(behind, 1e-9)
+
+    def _point(self, p_RE: Vector, u_R: Vector) -> Vector:
+        if self.arm.is_planar:
+            return self.solve_ik(np.array([p_RE[0], p_RE[1], np.arctan2(u_R[1], u_R[0])]))
+
+        def missing(pose: ArmPose) -> tuple[Vector, Vector]:
+            u = pose.R_RE[:, 0]
+            axis, cos = np.cross(u, u_R), float(u @ u_R)
+            sin = float(np.linalg.norm(axis))
+            turn = np.arctan2(sin, cos) * axis / max(sin, 1e-12) + (cos < -0.999) * pose.R_RE[:, 2]
+            across = pose.Jw_E - np.outer(u, u @ pose.Jw_E)
+            return np.append(p_RE - pose.p_RE, turn), np.vstack([pose.Jv_E, across])
+
+        return self._cheapest_first(self._newton(missing, self._seeds))
+
+    def _cheapest_first(self, q: Vector) -> Vector:
+        return q[np.argsort(self.calc_preselection_cost(q), kind="stable")]
+
+    @cached_property
+    def _seeds(self) -> Vector:
+        """Joint angles from which searches begin, always the same, shape (n, m)."""
+        rng = np.random.default_rng(0)
+        return rng.uniform(self.q_min, self.q_max, (_NUM_SEEDS, len(self.q_min)))
+
+    def _newton(
+        self, missing: Callable[[ArmPose], tuple[Vector, Vector]], seeds: Sequence[Vector] | Vector
+    ) -> Vector:
+        """Returns the distinct solutions that damped Newton steps within the limits come to.
+
+        Args:
+            missing: Gives the error that is left at a pose and its Jacobian.
+            seeds: Joint angles to begin from.
+        """
+        found: list[Vector] = []
+        for q in seeds:
+            for _ in range(_MAX_NEWTON_STEPS):
+                error, J = missing(self.calc_pose(q))
+                if np.abs(error).max() < IK_TOLERANCE:
+                    if all(np.abs(q - other).max() > _DISTINCT_RAD for other in found):
+                        found.append(q)
+                    break
+                step = J.T @ np.linalg.solve(J @ J.T + _DAMPING * np.eye(len(J)), error)
+                step *= min(1.0, _LARGEST_STEP / max(np.abs(step).max(), 1e-12))
+                q = np.clip(q + step, self.q_min, self.q_max)
+        return np.array(found).reshape(-1, len(self.q_min))
+
+
+class PlantKinematics(Kinematics):
+    """Forward kinematics from a Drake plant with the arm alone in it.
+
+    Args:
+        arm: The arm's geometry.
+        plant: The plant, whose positions are the joint angles; its world frame is R.
+        links: Frames of the skin links.
+        tip: Frame E.
+    """
+
+    def __init__(
+        self, arm: ArmGeometry, plant: MultibodyPlant, links: Sequence[Frame], tip: Frame
+    ) -> None:
+        super().__init__(arm)
+        self._plant, self._links, self._tip = plant, links, tip
+        self._context = plant.CreateDefaultContext()
+
+    def calc_pose(self, q: Vector) -> ArmPose:
+        """Returns the arm's pose at joint angles q, shape (m,), radians."""
+        plant, context, world = self._plant, self._context, self._plant.world_frame()
+        plant.SetPositions(context, q)
+        X_RL = [link.CalcPoseInWorld(context) for link in self._links]
+        X_RE = self._tip.CalcPoseInWorld(context)
+        J = plant.CalcJacobianSpatialVelocity(
+            context, JacobianWrtVariable.kV, self._tip, np.zeros(3), world, world
+        )
+        p_RE, Jw_E, Jv_E = X_RE.translation(), J[:3], J[3:]
+        return frozen(
+            ArmPose(
+                R_RL=np.array([X.rotation().matrix() for X in X_RL]),
+                p_RL=np.array([X.translation() for X in X_RL]),
+                p_RE=p_RE,
+                R_RE=X_RE.rotation().matrix(),
+                Jv_E=Jv_E,
+                Jw_E=Jw_E,
+                turn=cross_matrix(Jw_E),
+                moment=np.cross(Jw_E, p_RE, axisa=0, axisc=0) - Jv_E,
+            )
+        )
+
+
+def frozen(pose: ArmPose) -> ArmPose:
+    """Makes the arrays of a pose read-only, because all who ask for it share them."""
+    for array in pose:
+        array.flags.writeable = False
+    return pose
+
+
+def rigid_pose(x0: Vector) -> tuple[Vector, Vector]:
+    """Returns position, shape (3,), and rotation matrix, shape (3, 3), of a hand pose."""
+    if len(x0) == 3:
+        R = RotationMatrix.MakeZRotation(float(x0[2]))
+        return np.array([x0[0], x0[1], 0.0]), R.matrix()
+    return x0[:3], RotationMatrix(Quaternion(x0[3:] / np.linalg.norm(x0[3:]))).matrix()
+
+
+def keep_limits(q: Vector, q_min: Vector, q_max: Vector) -> tuple[Vector, BoolVector]:
+    """Returns the rows of q, shape (n, m), within the limits, and a mask of them, shape (n,).
+
+    What is beyond a limit by rounding is set to it.
+    """
+    legal = np.all((q >= q_min - LIMIT_TOLERANCE) & (q <= q_max + LIMIT_TOLERANCE), axis=1)
+    return np.clip(q[legal], q_min, q_max), legal
