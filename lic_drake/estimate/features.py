@@ -21,8 +21,8 @@ _OBSERVED = tuple(FIRST_PREFIX + name for name in SHOWN)
 
 _POSITIONS = tuple((f"{what}_x", f"{what}_y", f"{what}_z") for what in ("goal", "start", "final"))
 AXIS_OF_POSITION = {name: axis for names in _POSITIONS for axis, name in enumerate(names)}
-"""The columns that are positions, with their axes: told in R they are smaller by that component of
-b0. Angles and velocities are the same in R as in W."""
+"""The position columns and their axes: in R they are smaller by that component of b0. Angles and
+velocities are the same in R as in W."""
 
 _DECIMALS = 9  # Differences of the same numbers in another order are the same feature, metres.
 
@@ -228,8 +228,8 @@ class FeatureMap:
     def gradient_by_base(self, gradient: Vector) -> Vector:
         """Returns a gradient by b0 = (x, y, torso), shape (3,), from one by x, shape (d,).
 
-        Goal, first reach and start stand still in the world, so that each position told in R moves
-        by minus what the base moves.
+        Goal, first reach and start are fixed in W, so that positions in R change by minus the
+        displacement of the base.
         """
         by_base: Vector = -(_base_part(self.columns).T @ self._by_columns(gradient))
         return by_base
@@ -273,16 +273,16 @@ def _base_part(columns: tuple[str, ...]) -> Vector:
 
 
 PLANAR_LIC1 = FeatureMap(goal=("goal_x", "goal_y"), start=("start_y", "start_phi"))
-"""LIC-1 in the plane; x is the same all along the start line, so it is no feature."""
+"""LIC-1 in the plane; x is constant along the start line and therefore not a feature."""
 
 SPACE_LIC1 = FeatureMap(goal=("goal_y", "goal_z"), start=("start_y", "start_z"), relative=True)
-"""LIC-1 in space, where tools start in a plane across x, point along it, and goals lie in another.
+"""LIC-1 in space, where tools start in one plane across x, point along x, and goals lie in another.
 
-Whether the PR2 comes to a goal depends first of all on how far the goal lies aside of the aperture
-through which it reaches, and a kernel with a scale for each feature can say so only if this
-difference is a feature: the process's chosen start succeeds for 183 of 480 held-out goals instead
-of 163 (notebooks/results/ablation/space_features.md). The roll is no feature: where the aperture
-is says which one the arm takes.
+The PR2's success depends mainly on the offset between goal and aperture across x. A kernel with one
+scale per feature captures it only if the offset itself is a feature: the start that the process
+chooses succeeds for 183 of 480 held-out goals instead of 163
+(notebooks/results/ablation/space_features.md). The roll is not a feature, as the aperture's place
+determines it.
 """
 
 

@@ -31,12 +31,12 @@ from lic_drake.seeds import make_generator
 from lic_drake.types import IntVector, Vector
 
 _DESIGN_EFFECTS = (1.0, 2.0, 4.0, 8.0, 16.0)
-# A matrix of that many rows takes half a gigabyte. The search for settings inverts hundreds.
+# A matrix of that many rows takes half a gigabyte; the search for settings inverts hundreds.
 _MAX_ROWS = 8000
 _MAX_SETTINGS_ROWS = 1000
 _MAX_SEARCH_ROWS = 300
-# Bounds of theta are per standard deviation of a feature: from nearly a straight line through
-# all rows to rows that tell nothing about each other.
+# Bounds of theta are per standard deviation of a feature: from nearly linear over all rows to
+# uncorrelated rows.
 _BOUNDS = {"theta": (1e-3, 10.0), "signal": (1e-4, 4.0), "floor": (1e-6, 0.25)}
 _THETA_STARTS = (0.05, 0.3, 1.5)
 
@@ -56,10 +56,6 @@ class Hyperparameters:
     signal_variance: float
     noise_floor: float
     reach_variance: float
-
-    def noise(self, count: Vector) -> Vector:
-        """Returns the noise variance of rows with these numbers of reaches, shape (m,)."""
-        return self.reach_variance / count + self.noise_floor
 
 
 class GaussianProcess(SuccessEstimator):
@@ -88,8 +84,8 @@ class GaussianProcess(SuccessEstimator):
                 f" {len(rows.X)}; use the estimator 'knn'"
             )
         chosen = self.hyperparameters
-        # The matrices are small: OpenBLAS threads that wait for a busy core made a fit of two
-        # seconds take minutes.
+        # The matrices are small, and on a busy machine OpenBLAS threads that wait for each other
+        # made a fit of two seconds take minutes.
         with threadpool_limits(limits=1, user_api="blas"):
             if chosen is None:
                 chosen = _choose_hyperparameters(X, y, weight, selection_folds(groups, len(y)))
@@ -103,7 +99,7 @@ class GaussianProcess(SuccessEstimator):
         return self._posterior.mean(X)
 
     def _value_and_gradient(self, x: Vector) -> tuple[float, Vector]:
-        """At a kink the gradient is the mean of both sides'."""
+        """Returns value and gradient; at a kink the mean of the gradients on both sides."""
         return self._posterior.mean_and_gradient(x)
 
 
@@ -145,7 +141,8 @@ def condition(rows: AveragedRows, hyperparameters: Hyperparameters) -> Posterior
     """Returns the process given rows of success rates."""
     correlation = l1_correlation(rows.X, rows.X, hyperparameters.theta)
     covariance = hyperparameters.signal_variance * correlation
-    covariance[np.diag_indices(len(rows.X))] += hyperparameters.noise(rows.count)
+    noise = hyperparameters.reach_variance / rows.count + hyperparameters.noise_floor
+    covariance[np.diag_indices(len(rows.X))] += noise
     factor = cho_factor(covariance, lower=True, overwrite_a=True, check_finite=False)
     targets = np.column_stack([rows.rate, np.ones(len(rows.rate))])
     weights = cho_solve(factor, targets, check_finite=False)

@@ -18,7 +18,7 @@ from lic_drake.seeds import make_generator
 from lic_drake.types import BoolVector, IntVector, Vector
 
 _CACHE_SIZE = 64
-# In length scales: queries in one cell share a local model, which is that of the cell's centre.
+# In length scales: all queries in a cell use the local model of the cell's centre.
 _CELL = 0.5
 _SETTINGS_ROWS = 20_000
 # Candidates for a process: decay over a length scale, and noise variance of a reach relative to
@@ -75,11 +75,11 @@ class Neighbourhoods:
 class LocalEstimator(SuccessEstimator):
     """Fits a model to the rows whose situation is nearest.
 
-    Rows are near in the situation, not in the decision: one local model then serves a whole
+    Distance is measured in the situation, not in the decision: one local model then serves a whole
     optimisation over starts, and value and gradient belong to one smooth function. Where a moving
-    base moves the situation, too, a model serves half a length scale, and the estimate has a small
-    jump where the next one takes over. Rows at equal distance are taken in random order, lest the
-    order of the library choose environments.
+    base also moves the situation, a model serves half a length scale, and the estimate jumps
+    slightly between models. Ties are broken at random, lest the order of the library choose
+    environments.
 
     Attributes:
         choose: Returns an unfitted model with settings for a library, such as `choose_process`.
@@ -137,7 +137,7 @@ class LocalEstimator(SuccessEstimator):
         return values
 
     def _value_and_gradient(self, x: Vector) -> tuple[float, Vector]:
-        """The gradient by the situation leaves out that other situations have other rows."""
+        """Returns both from the local model; the choice of its rows is not differentiated."""
         return self._local_model(self._cell(x))._value_and_gradient(x)
 
     def _cell(self, X: Vector) -> Vector:
@@ -171,14 +171,13 @@ def choose_neighbours(near: Neighbourhoods) -> NearestNeighbours:
 
 
 def choose_process(near: Neighbourhoods) -> GaussianProcess:
-    """Returns a process with the settings that best predict local rows held out.
+    """Returns a process with the settings that best predict held-out local rows.
 
-    The scales of the features relative to each other are those by which rows are near. It remains
-    to choose how fast the correlation decays and how noisy a reach is: those with the least squared
-    error at 20 random situations whose environments are held out, each predicted from the 300
-    nearest rows of other environments. The marginal likelihood, for which the rows of a part of
-    the library serve, takes repeated outcomes in one environment as independent evidence: with D2
-    its scales differed a hundredfold from part to part.
+    Features keep their scales relative to each other, the length scales. The decay of the
+    correlation and the noise of a reach are those with the least squared error at 20 random
+    situations whose environments are held out, each predicted from the 300 nearest rows of other
+    environments. The marginal likelihood would take repeated outcomes in one environment as
+    independent evidence: on D2 its scales differed a hundredfold between parts of the library.
 
     Args:
         near: The library.

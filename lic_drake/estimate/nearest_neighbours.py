@@ -1,7 +1,6 @@
 """K nearest neighbours with Gaussian weights (paper III-D)."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Self, cast
 
 import numpy as np
@@ -18,22 +17,12 @@ from lic_drake.types import BoolVector, IntVector, Vector
 
 _MAX_POINTS = 500
 _SEARCH_NEIGHBOURS = 100
-# Bandwidths in standard deviations of their feature: from nearest neighbours only to a feature
-# that tells nothing.
+# Bandwidths in standard deviations of their feature: from the nearest neighbours alone to an
+# uninformative feature.
 _SMALLEST, _LARGEST = 0.02, 8.0
 _COMMON = np.geomspace(0.1, 1.6, 9)
 _STEPS = (2.0, 2.0, np.sqrt(2.0))
 _DECIMALS = 9
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Points:
-    """Distinct feature vectors in bandwidths, shape (m, d), with success rates and counts."""
-
-    tree: cKDTree
-    points: Vector
-    rate: Vector
-    count: Vector
 
 
 class NearestNeighbours(SuccessEstimator):
@@ -50,9 +39,9 @@ class NearestNeighbours(SuccessEstimator):
         bandwidth: Standard deviation of the weights along each feature, shape (d,), in its unit.
             None: `fit` takes the bandwidths that best predict held-out environments.
         held_out: Matrix A, shape (k, d). If given, rows with equal A x are held out together
-            instead of environments, for a library that tries each pair of goal and start in
-            several environments: without one of them the pair is still there, and bandwidths that
-            see nothing but the pair itself win.
+            instead of environments, for a library that repeats each pair of goal and start in
+            several environments: the pair is then still among the other folds, and bandwidths that
+            see nothing but the pair itself would win.
         bandwidth_: The bandwidths in use.
     """
 
@@ -80,31 +69,28 @@ class NearestNeighbours(SuccessEstimator):
                 groups = np.unique(common, axis=0, return_inverse=True)[1].ravel()
             given = select_bandwidths(rows, y, weight, selection_folds(groups, len(y)))
         self.bandwidth_ = given
-        points = rows.X / given
-        self._points = _Points(
-            tree=cKDTree(points), points=points, rate=rows.rate, count=rows.count
-        )
+        self._points = rows.X / given
+        self._tree = cKDTree(self._points)
+        self._rate, self._count = rows.rate, rows.count
 
     def _settled(self) -> Self:
         return cast(Self, clone(self).set_params(bandwidth=self.bandwidth_))
 
     def _values(self, X: Vector) -> Vector:
-        at = self._points
-        distance, index = query_neighbours(at.tree, X / self.bandwidth_, self.neighbours)
-        weight = gaussian_weights(distance) * at.count[index]
-        values = np.sum(weight * at.rate[index], axis=1) / weight.sum(axis=1)
+        distance, index = query_neighbours(self._tree, X / self.bandwidth_, self.neighbours)
+        weight = gaussian_weights(distance) * self._count[index]
+        values = np.sum(weight * self._rate[index], axis=1) / weight.sum(axis=1)
         return np.clip(values, 0.0, 1.0)  # It leaves [0, 1] by rounding only.
 
     def _value_and_gradient(self, x: Vector) -> tuple[float, Vector]:
-        """Both belong to the neighbours at hand: the estimate jumps a little where these change."""
-        at = self._points
+        """Returns both for the neighbours at hand; the estimate jumps where these change."""
         query = x / self.bandwidth_
-        distance, index = query_neighbours(at.tree, query, self.neighbours)
-        weight = gaussian_weights(distance) * at.count[index]
+        distance, index = query_neighbours(self._tree, query, self.neighbours)
+        weight = gaussian_weights(distance) * self._count[index]
         weight /= weight.sum()
-        rate = at.rate[index]
+        rate = self._rate[index]
         value = weight @ rate
-        pull = (weight * (rate - value)) @ (at.points[index] - query)
+        pull = (weight * (rate - value)) @ (self._points[index] - query)
         return float(value), pull / self.bandwidth_
 
 
@@ -132,12 +118,11 @@ def gaussian_weights(distance: Vector) -> Vector:
 
 
 def select_bandwidths(rows: AveragedRows, y: Vector, weight: Vector, fold: IntVector) -> Vector:
-    """Returns the bandwidth of each feature, shape (d,), by search along one after the other.
+    """Returns the bandwidth of each feature, shape (d,), from a coordinate-wise search.
 
     It minimises the squared error in held-out folds, at 500 points at most and with 100
-    neighbours. Where features matter differently, as a start's orientation and a goal's distance
-    do, a common bandwidth in standard deviations averages too much along one and too little along
-    the other.
+    neighbours. A common bandwidth in standard deviations would average too much along some
+    features, such as a start's orientation, and too little along others.
 
     Args:
         rows: The distinct points.

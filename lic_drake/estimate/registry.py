@@ -61,7 +61,7 @@ def estimator_names() -> tuple[str, ...]:
 
 
 def _process(features: FeatureMap) -> "SuccessEstimator":
-    """All rows of LIC-1; of LIC-2's many rows the nearest."""
+    """Uses all rows for LIC-1, and the nearest of LIC-2's many rows."""
     if features.observed:
         from lic_drake.estimate.local import LocalEstimator, choose_process
 
@@ -72,7 +72,7 @@ def _process(features: FeatureMap) -> "SuccessEstimator":
 
 
 def _neighbours(features: FeatureMap) -> "SuccessEstimator":
-    """All rows of LIC-1; of LIC-2's many rows the nearest."""
+    """Uses all rows for LIC-1, and the nearest of LIC-2's many rows."""
     if features.observed:
         from lic_drake.estimate.local import LocalEstimator, choose_neighbours
 

@@ -103,11 +103,11 @@ class AveragedRows:
 
 
 def average_rows(X: Vector, y: Vector, weight: Vector | None = None) -> AveragedRows:
-    """Averages y, shape (n,), over equal rows of X, shape (n, d).
+    """Averages y over equal rows of X.
 
     Args:
-        X: Features.
-        y: Successes.
+        X: Features, shape (n, d).
+        y: Successes, shape (n,).
         weight: How many reaches each row counts as, shape (n,); one by default.
     """
     weight = np.ones(len(X)) if weight is None else weight
