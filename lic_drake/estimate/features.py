@@ -1,7 +1,7 @@
 """From records, goals and starts to feature vectors x, and the features of each category."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -44,15 +44,6 @@ class ExperienceRows:
     groups: IntVector
     weight: Vector
     simulated: BoolVector
-
-    def join(self, other: "ExperienceRows") -> "ExperienceRows":
-        """Returns these rows, then the other ones; equal groups stay equal."""
-        return ExperienceRows(
-            **{
-                field.name: np.concatenate([getattr(self, field.name), getattr(other, field.name)])
-                for field in fields(self)
-            }
-        )
 
 
 @dataclass(frozen=True, kw_only=True)

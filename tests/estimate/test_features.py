@@ -220,9 +220,9 @@ def test_weight_and_source_are_columns_with_defaults(columns) -> None:
     assert rows.weight.tolist() == [1.0, 1.0]
     assert rows.simulated.tolist() == [True, True]
     columns |= {"weight": np.array([1.0, 20.0]), "source": np.array(["simulation", "lab"])}
-    both = rows.join(PLANAR_LIC1.rows(columns))
-    assert both.weight.tolist() == [1.0, 1.0, 1.0, 20.0]
-    assert both.simulated.tolist() == [True, True, True, False]
+    rows = PLANAR_LIC1.rows(columns)
+    assert rows.weight.tolist() == [1.0, 20.0]
+    assert rows.simulated.tolist() == [True, False]
 
 
 # Of categories
