@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from lic_drake.evaluate.statistics import Count, count, mcnemar
+from lic_drake.evaluate.table import rate_cells
 from lic_drake.evaluate.trials import TrialTable
 
 
@@ -60,10 +61,10 @@ def format_rates(rates: Sequence[Rate]) -> str:
         "|---|---|---|---|---|---|",
     ]
     for rate in rates:
-        low, high = rate.count.interval()
+        success, interval, _ = rate_cells(rate.count)
         p = "" if rate.p_value != rate.p_value else f"{rate.p_value:.2g}"
         lines.append(
-            f"| {rate.method} | {rate.attempts} | {100 * rate.count.rate:.1f} |"
-            f" {100 * low:.1f}..{100 * high:.1f} | {rate.count.trials} | {p} |"
+            f"| {rate.method} | {rate.attempts} | {success} | {interval} | {rate.count.trials}"
+            f" | {p} |"
         )
     return "\n".join(lines) + "\n"

@@ -1,15 +1,12 @@
-"""Measures what a collection costs beside its reaches: disk, messages, the Dask scheduler's time.
+"""Measures what a collection costs beside its reaches: time of Dask's scheduler and the collector.
 
-Starts a scheduler and workers on this machine. The figures of a million reaches follow from the
-measured ones and from --reach-s, which is by default the mean wall time in the shipped library.
+    python scripts/scheduler/run.py --out notebooks/results/scaling/README.md
 
-    python scripts/scheduler/run.py > notebooks/results/scaling/README.md
+Starts a scheduler and workers on this machine; reaches take no time, so that only the rest is
+measured.
 """
 
-import argparse
-import math
 import os
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -23,8 +20,8 @@ from lic_drake.experience.dask_workers import DaskWorkers
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 from lic_drake.reach.request import ReachRecord, ReachRequest
+from scripts.common import make_parser, run_script, write_report
 
-MILLION = 1_000_000
 PER_TASK = 945
 """Reaches of one environment in the paper's grid: 45 goals x 21 starts."""
 
@@ -59,62 +56,26 @@ class Cost:
         wall_s: Wall time.
         scheduler_s: CPU time of the scheduler.
         collector_s: CPU time of this process.
-        traffic: Messages and bytes through the scheduler's connections.
     """
 
     tasks: int
     wall_s: float
     scheduler_s: float
     collector_s: float
-    traffic: dict[str, float]
 
 
-def count_traffic(dask_scheduler: Any) -> None:
-    """Runs in the scheduler: counts what goes through its connections from now on."""
-    from distributed.comm import tcp
-
-    traffic = dask_scheduler.lic_traffic = {"messages": 0, "bytes": 0}
-    read, write, read_bytes = tcp.TCP.read, tcp.TCP.write, tcp.read_bytes_rw
-
-    async def counting_read(self: Any, *args: Any, **kwargs: Any) -> Any:
-        message = await read(self, *args, **kwargs)
-        traffic["messages"] += 1
-        return message
-
-    async def counting_write(self: Any, *args: Any, **kwargs: Any) -> Any:
-        size = await write(self, *args, **kwargs)
-        traffic["messages"] += 1
-        traffic["bytes"] += size
-        return size
-
-    async def counting_read_bytes(stream: Any, size: int) -> Any:
-        traffic["bytes"] += size
-        return await read_bytes(stream, size)
-
-    tcp.TCP.read, tcp.TCP.write, tcp.read_bytes_rw = (
-        counting_read,
-        counting_write,
-        counting_read_bytes,
-    )
-
-
-def look(dask_scheduler: Any) -> dict[str, float]:
+def cpu_s() -> float:
     """Runs in the scheduler."""
-    return {"cpu_s": time.process_time(), **dask_scheduler.lic_traffic}
+    return time.process_time()
 
 
 def measure(client: Any, tasks: int, run: Callable[[], object]) -> Cost:
     """Runs tasks and returns what they took."""
-    before, wall, collector = (
-        client.run_on_scheduler(look),
-        time.perf_counter(),
-        time.process_time(),
-    )
+    scheduler = client.run_on_scheduler(cpu_s)
+    wall, collector = time.perf_counter(), time.process_time()
     run()
     wall, collector = time.perf_counter() - wall, time.process_time() - collector
-    after = client.run_on_scheduler(look)
-    used = {name: after[name] - before[name] for name in before}
-    return Cost(tasks, wall, used.pop("cpu_s"), collector, used)
+    return Cost(tasks, wall, client.run_on_scheduler(cpu_s) - scheduler, collector)
 
 
 def measure_all(tasks: int) -> tuple[dict[int, Cost], dict[str, Cost]]:
@@ -139,7 +100,6 @@ def measure_all(tasks: int) -> tuple[dict[int, Cost], dict[str, Cost]]:
             collect(library, request, cluster, reach=instant_reach)
 
         fill(4)  # The workers import what they need.
-        client.run_on_scheduler(count_traffic)
         idle = {2: measure(client, IDLE_S, lambda: time.sleep(IDLE_S))}
         costs = {
             "`client.submit` of an instant function": measure(
@@ -157,124 +117,55 @@ def measure_all(tasks: int) -> tuple[dict[int, Cost], dict[str, Cost]]:
     return idle, costs
 
 
-def disk_section() -> list[str]:
-    library = ExperienceLibrary(shipped_library("cylinder-clutter"))
-    records = library.records()
-    shard = sum(path.stat().st_size for path in library.shard_paths()) / len(records)
-    return [
-        "## Disk",
-        "",
-        f"From the {len(records)} reaches of the shipped library:",
-        "",
-        "| | bytes per reach | |",
-        "|---|---|---|",
-        f"| shard (Parquet) | {shard:.0f} | {shard * MILLION / 1e6:.0f} MB a million |",
-    ]
-
-
-def task_section(idle: dict[int, Cost], costs: dict[str, Cost]) -> list[str]:
-    record_s = 2 * costs[ALL].wall_s / costs[ALL].tasks / PER_TASK
-    return [
-        "## Tasks",
-        "",
-        "Two workers, reaches that take no time, so that only the rest is measured. Messages and"
-        " bytes are all that pass the scheduler, in both directions, heartbeats included.",
-        "",
-        "| | tasks | tasks/s | scheduler CPU, ms/task | collector CPU, ms/task | messages/task"
-        " | bytes/task |",
-        "|---|---|---|---|---|---|---|",
-        *(
-            f"| {name} | {cost.tasks} | {cost.tasks / cost.wall_s:.0f}"
-            f" | {1e3 * cost.scheduler_s / cost.tasks:.2f}"
-            f" | {1e3 * cost.collector_s / cost.tasks:.2f}"
-            f" | {cost.traffic['messages'] / cost.tasks:.1f}"
-            f" | {cost.traffic['bytes'] / cost.tasks:.0f} |"
-            for name, cost in costs.items()
-        ),
-        "",
-        f"A reach takes {1e3 * record_s:.2f} ms beside its simulation.",
-        "",
-        "| idle workers | scheduler CPU, ms/s | messages/s |",
-        "|---|---|---|",
-        *(
-            f"| {n} | {1e3 * cost.scheduler_s / cost.tasks:.1f}"
-            f" | {cost.traffic['messages'] / cost.tasks:.1f} |"
-            for n, cost in idle.items()
-        ),
-    ]
-
-
-def saturation_section(idle: dict[int, Cost], cost: Cost, reach_s: float) -> list[str]:
+def report(idle: dict[int, Cost], costs: dict[str, Cost], reach_s: float) -> str:
+    """Returns the costs as Markdown, and how many workers keep scheduler and collector busy."""
+    one = costs[ONE]
     # Up to ten workers send two heartbeats a second each.
     heartbeat_s = (idle[10].scheduler_s - idle[2].scheduler_s) / (IDLE_S * 2 * (10 - 2))
     share = MAX_HEARTBEATS * heartbeat_s
-    scheduler_s, collector_s = cost.scheduler_s / cost.tasks, cost.collector_s / cost.tasks
-    busiest_s = max(scheduler_s / (1 - share), collector_s)
-    return [
-        "## Saturation",
+    scheduler_s = one.scheduler_s / one.tasks / (1 - share)
+    busiest_s = max(scheduler_s, one.collector_s / one.tasks)
+    record_s = 2 * costs[ALL].wall_s / costs[ALL].tasks / PER_TASK
+    lines = [
+        "# Scaling",
         "",
-        f"Computed, not tried: heartbeats ({1e3 * heartbeat_s:.2f} ms each, at most"
-        f" {MAX_HEARTBEATS} a second from however many workers) take up to {share:.0%} of the"
-        f" scheduler's core; what is left serves a task every"
-        f" {1e3 * scheduler_s / (1 - share):.1f} ms, the collector one every"
-        f" {1e3 * collector_s:.1f} ms. A task of n reaches keeps a worker busy for"
-        f" n x {reach_s:.2g} s.",
+        f"Measured by `python scripts/scheduler/run.py` on {os.cpu_count()} cores, two workers.",
         "",
-        "| reaches a task | task, s | workers at saturation |",
+        "| | tasks | tasks/s | scheduler CPU, ms/task | collector CPU, ms/task |",
+        "|---|---|---|---|---|",
+        *(
+            f"| {name} | {cost.tasks} | {cost.tasks / cost.wall_s:.0f}"
+            f" | {1e3 * cost.scheduler_s / cost.tasks:.2f}"
+            f" | {1e3 * cost.collector_s / cost.tasks:.2f} |"
+            for name, cost in costs.items()
+        ),
+        "",
+        f"A reach takes {1e3 * record_s:.2f} ms beside its simulation. Idle workers cost the"
+        " scheduler "
+        + ", ".join(f"{1e3 * c.scheduler_s / c.tasks:.0f} ms/s ({n})" for n, c in idle.items())
+        + ".",
+        "",
+        f"Computed, not tried: heartbeats take up to {share:.0%} of the scheduler's core; what is"
+        f" left serves a task every {1e3 * scheduler_s:.1f} ms, the collector one every"
+        f" {1e3 * one.collector_s / one.tasks:.1f} ms. With reaches of {reach_s:.2g} s both keep up"
+        " with",
+        "",
+        "| reaches a task | task, s | workers |",
         "|---|---|---|",
         *(f"| {n} | {n * reach_s:.3g} | {n * reach_s / busiest_s:,.0f} |" for n in (1, PER_TASK)),
     ]
+    return "\n".join(lines) + "\n"
 
 
-def million_section(reach_s: float, price: float) -> list[str]:
-    tasks = math.ceil(MILLION / PER_TASK)
-    rows = []
-    for cores in (100, math.ceil(tasks / 2), 1000, tasks):
-        wall_h = math.ceil(tasks / cores) * PER_TASK * reach_s / 3600
-        ideal_h = MILLION * reach_s / cores / 3600
-        rows.append(
-            f"| {cores} | {60 * wall_h:.1f} | {60 * ideal_h:.1f} | {wall_h * cores * price:.2f} |"
-        )
-    return [
-        "## A million reaches",
-        "",
-        f"{MILLION:,} x {reach_s:.2g} s = {MILLION * reach_s / 3600:.1f} core hours, in {tasks}"
-        f" tasks of {PER_TASK * reach_s:.0f} s. Wall time = ceil(tasks / cores) x task; cost ="
-        " cores x wall time x price, idle cores paid to the end. The price is an assumption:"
-        f" {price:g} USD per core hour (a spot machine); --price changes it.",
-        "",
-        "| cores | wall time, min | were tasks divisible, min | cost, USD |",
-        "|---|---|---|---|",
-        *rows,
-    ]
-
-
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def main() -> None:
+    parser = make_parser(__doc__)
     parser.add_argument("--tasks", type=int, default=2000)
-    parser.add_argument("--reach-s", type=float, help="wall time of a reach, seconds")
-    parser.add_argument("--price", type=float, default=0.04, help="USD per core hour, assumed")
+    parser.add_argument("--out", type=Path, help="Markdown file")
     args = parser.parse_args()
     library = ExperienceLibrary(shipped_library("cylinder-clutter"))
-    reach_s = args.reach_s or float(library.columns()["wall_time_s"].mean())
     idle, costs = measure_all(args.tasks)
-    sections = [
-        [
-            "# Scaling",
-            "",
-            f"Measured by `python scripts/scheduler/run.py` on {os.cpu_count()} cores; a reach"
-            f" is taken to last {reach_s:.3g} s ("
-            + ("given as --reach-s" if args.reach_s else "mean wall time in the shipped library")
-            + ").",
-        ],
-        disk_section(),
-        task_section(idle, costs),
-        saturation_section(idle, costs[ONE], reach_s),
-        million_section(reach_s, args.price),
-    ]
-    print("\n\n".join("\n".join(section) for section in sections))
-    return 0
+    write_report(args.out, report(idle, costs, float(library.columns()["wall_time_s"].mean())))
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_script(main)
