@@ -1,4 +1,4 @@
-"""What several scripts need: where results lie, running reaches that are kept, writing tables."""
+"""Shared by the scripts: command lines, reaches that are kept, tables and reports."""
 
 import argparse
 import os
@@ -40,7 +40,7 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
 
 
 def run_script(main: Callable[[], object]) -> None:
-    """Runs a script; an error that the package explains becomes one line and exit code 2."""
+    """Runs a script; an error of the package becomes one line on stderr and exit code 2."""
     try:
         main()
     except LicError as error:

@@ -86,4 +86,4 @@ TABLE_II = {tuple(t["pair"]): TTest(t["df"], t["t"], t["p"]) for t in _DATA["t_t
 """Table II, "paired sample t-tests in cylinder-clutter", by pair of strategies."""
 
 REMARKS = tuple(Remark(**remark) for remark in _DATA["remarks"])
-"""What to know before comparing with the paper; each sum and test is checked by our tests."""
+"""Caveats when comparing with the paper; every sum and test in them is checked by our tests."""

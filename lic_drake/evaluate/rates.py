@@ -1,4 +1,4 @@
-"""Success rates of an evaluation at a glance."""
+"""Summary of an evaluation: success rates by strategy and number of attempts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ class Rate:
         method: Name of the strategy.
         attempts: How many attempts count.
         count: Trials that reached the goal, of all trials.
-        p_value: Of McNemar's exact paired test against RND on the same goals; NaN for RND.
+        p_value: McNemar's exact paired test against RND on the same goals; NaN for RND.
     """
 
     method: str
@@ -40,7 +40,7 @@ def summarize_trials(table: TrialTable, attempts: int, variant: str = "") -> lis
 
 
 def rates_to_dicts(rates: Sequence[Rate]) -> list[dict[str, Any]]:
-    """Returns the rates as plain data for JSON; a test that was not made is None."""
+    """Returns the rates as plain data for JSON; p-values that do not exist are None."""
     return [
         {
             "method": rate.method,

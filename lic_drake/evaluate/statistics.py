@@ -1,4 +1,4 @@
-"""Counts of successes and the tests that compare two strategies."""
+"""Success counts and tests that compare two strategies."""
 
 import math
 from typing import NamedTuple
@@ -40,8 +40,8 @@ def count(success: NDArray[np.bool_]) -> Count:
 def mcnemar(a: NDArray[np.bool_], b: NDArray[np.bool_]) -> float:
     """Returns the p-value of McNemar's exact test for paired successes, shape (n,) each.
 
-    Of the pairs in which just one strategy succeeds, either is as likely to be the one: a sign
-    test of these pairs (McNemar 1947, with binomial instead of normal probabilities).
+    A sign test of the pairs in which exactly one strategy succeeds (McNemar 1947, with binomial
+    instead of normal probabilities).
     """
     only_a, only_b = int(np.sum(a & ~b)), int(np.sum(b & ~a))
     if only_a + only_b == 0:
@@ -107,8 +107,8 @@ def two_sample_t_test(a: Count, b: Count) -> TTest:
     """Compares two success rates by Student's t with pooled variance, as in the paper's Table II.
 
     The paper calls its tests paired, but its degrees of freedom and all five of its values of t
-    are those of this unpaired test on the totals of two attempts. It knows nothing of the trials
-    being the same for both strategies; `mcnemar` does.
+    are those of this unpaired test on the totals of two attempts. It ignores that both strategies
+    face the same trials; `mcnemar` does not.
 
     Args:
         a: Successes of one strategy.

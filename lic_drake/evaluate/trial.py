@@ -45,7 +45,7 @@ def run_trial(
         stream: Seed stream of the environment.
         environment: Its index.
         p_WG: Goal, shape (3,), metres.
-        attempts: How many reaches at the most.
+        attempts: Maximum number of reaches.
         fresh: Whether every attempt finds the environment as it was drawn; otherwise it finds it
             as the attempt before left it, as on a real robot.
         moves: Whether a PR2 may move base and torso before a reach.

@@ -1,4 +1,4 @@
-"""What features, estimators and their settings bring, on environments that fits never saw.
+"""Compares features, estimators and settings on held-out environments.
 
 python scripts/ablation/run.py models/experience/passage-clutter \
     models/experience/cylinder-clutter --out notebooks/results/cross_validation

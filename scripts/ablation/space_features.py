@@ -1,8 +1,8 @@
-"""What relative features and LIC-2 bring to a PR2's estimators, at goals that fits never saw.
+"""Compares features and LIC-2 of the PR2's estimators at held-out goals.
 
     python scripts/ablation/space_features.py --out notebooks/results/ablation/space_features.md
 
-One goal of the library after the other is held out, in all environments.
+Each goal of the library is held out in turn, in all environments.
 """
 
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,7 @@
-"""Success rates that choices of starts attain, from reaches from every start at every goal.
+"""Success rates attained by choosing among starts, given reaches from every start to every goal.
 
 Arrays have the shape (E, G, S): E environments, G goals in each, S starts at each goal. All rates
-are given by environment, shape (E,), because reaches in one environment share its luck.
+are given by environment, shape (E,), because reaches in one environment are correlated.
 """
 
 from itertools import combinations

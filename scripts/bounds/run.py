@@ -1,4 +1,4 @@
-"""Tries every discrete start at evaluation goals: what the best choice could attain.
+"""Reaches from every discrete start to evaluation goals, for the best possible choice.
 
 python scripts/bounds/run.py cylinder-clutter --environments 40 --goals 10
 python scripts/bounds/run.py passage-clutter --environments 300

@@ -4,10 +4,10 @@
 
 The oracle knows the environment: it succeeds where some start does. The population optimum knows
 the goal only, as LIC-1 does, and each start's success rate there over environments. In sample it
-is too good: a start is chosen for the luck it had in the very environments that judge it. Held
-out, the other environments choose; that is a little too bad, because fewer of them choose. Behind
-apertures each environment has its own starts; there an estimator with more experience than LIC's
-stands in for the population optimum.
+is optimistic, because starts are chosen and judged in the same environments. Held out, they are
+chosen in the other environments, which is slightly pessimistic, because there are fewer of them.
+Behind apertures each environment has its own starts; there an estimator with more experience than
+LIC's stands in for the population optimum.
 
 Strategies choose among the same discrete starts, so their success is read from the same reaches.
 """
@@ -58,7 +58,7 @@ RESAMPLES = 2000
 
 @dataclass(frozen=True, kw_only=True)
 class Bound:
-    """A success rate with what each environment contributes.
+    """A success rate, broken down by environment.
 
     Attributes:
         name: What attains it.
@@ -76,10 +76,10 @@ class Bound:
         return float(self.by_environment.mean())
 
     def interval(self, confidence: float = 0.9) -> tuple[float, float]:
-        """Returns the bootstrap interval of the rate, from environments drawn anew.
+        """Returns the bootstrap interval of the rate, by resampling environments.
 
-        Environments are drawn, not reaches, because reaches in one environment share its luck.
-        The choices, of starts and bandwidth, stay as they are.
+        Environments are drawn, not reaches, because reaches in one environment are correlated.
+        The choices of starts and bandwidth stay fixed.
         """
         rng = make_generator("holdout", "bootstrap")
         n = len(self.by_environment)

@@ -3,9 +3,8 @@
     python scripts/convergence/run.py notebooks/results/convergence
     python scripts/convergence/run.py --scenario sphere-aperture-clutter --reaches 100 OUT
 
-Random starts and goals in calibration environments, for the PR2 starts near the goal; one row a
-variant: success rate, how often the outcome equals the reference's, and cost. Reaches are kept and
-not run again.
+Random starts and goals in calibration environments, for the PR2 starts near the goal; one row per
+variant: success rate, agreement with the reference, and cost. Existing reaches are reused.
 """
 
 from pathlib import Path
@@ -43,11 +42,11 @@ IN_SPACE = {
 """Variants by name; the last one is what the others are compared with."""
 
 NEAR_STARTS = 3
-"""In space a reach begins at one of so many apertures that are nearest to the goal."""
+"""In space, a reach starts at one of this many apertures nearest to the goal."""
 
 
 def near_requests(scenario: Scenario, count: int) -> list[ReachRequest]:
-    """Returns reaches from apertures near the goal: from others hardly any comes through."""
+    """Returns reaches from apertures near the goal; reaches from others hardly ever succeed."""
     requests = []
     for environment in range(count):
         instance = scenario.sample_instance("calibration", environment)

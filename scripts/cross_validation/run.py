@@ -1,4 +1,4 @@
-"""Compares success estimators on environments of a library that their fits never saw.
+"""Compares success estimators on held-out environments of a library.
 
 python scripts/cross_validation/run.py models/experience/cylinder-clutter --out notebooks/results
 """

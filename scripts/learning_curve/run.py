@@ -54,7 +54,7 @@ def learning_point(
     """Measures the selection among each held-out environment's starts, learning from `size` rows.
 
     The rows are drawn from all environments of the other folds. The interval is Student's over
-    environments; it does not cover what other rows would have taught.
+    environments; it does not cover the choice of the rows.
 
     Args:
         name: Of the estimator.

@@ -43,7 +43,7 @@ class MujocoSimulation:
         self.sense()
 
     def is_in_collision(self) -> bool:
-        """Tells whether anything touches now."""
+        """Returns whether anything is in contact."""
         return bool(np.any(self.data.contact.dist < 0.0))
 
     def advance_to(self, time_s: float) -> None:

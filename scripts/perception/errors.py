@@ -1,4 +1,4 @@
-"""How far perception is off, and how often it is wrong, in random scenes (paper V-B)."""
+"""Accuracy of perception in random scenes (paper V-B)."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -84,7 +84,7 @@ def true_states(board: ApertureBoard, instance: ClutterInstance) -> tuple[str, .
 def measure_scene(
     scenario: Scenario, cameras: CamerasConfig, scene: int
 ) -> tuple[list[ApertureError], list[GoalError]]:
-    """Looks at an evaluation environment, once exactly and once with the cameras' errors.
+    """Observes an evaluation environment, with exact images and with the cameras' errors.
 
     Raises:
         RenderingError: Cameras cannot be simulated on this machine.

@@ -2,8 +2,8 @@
 
     python scripts/perception/run.py notebooks/results/perception
 
-Writes perception.md, apertures.parquet and goals.parquet; what is there already is not measured
-again. The scenes are environments of the evaluation stream; nothing was tried out on them.
+Writes perception.md, apertures.parquet and goals.parquet; existing scenes are not measured
+again. The scenes are environments of the evaluation stream, which nothing was tuned on.
 """
 
 from dataclasses import asdict
@@ -24,7 +24,7 @@ from scripts.perception.errors import (
 )
 
 SAVE_EVERY = 20
-"""After so many scenes the results so far are written."""
+"""Number of scenes between two writes of the results."""
 
 
 def save(

@@ -1,10 +1,10 @@
-"""Measures how LIC-1 gains from a real robot's records where the simulated passages are wrong.
+"""Measures what real records add to LIC-1 where the simulated passages are wrong.
 
     python scripts/real_experience/run.py
 
 The "real" world is simulated, too: passages whose walls run straight ahead, -10 to 10 degrees from
-+x, where those of the library lean to the left by 5 to 35 degrees (paper VII). Run again, it goes
-on where it was.
++x, where those of the library lean to the left by 5 to 35 degrees (paper VII). An interrupted run
+can be resumed.
 """
 
 import shutil
@@ -95,7 +95,7 @@ def evaluate_learned(
 
 
 def success_table(counts: dict[Learned, Count], random: Count) -> Table:
-    """Returns success by the number of records and their weight.
+    """Tabulates success by number of records and weight.
 
     Args:
         counts: Success of LIC-1.

@@ -82,7 +82,7 @@ def best_possible(starts: PointingStarts, samples: Starts, values: Vector) -> fl
 
 
 def is_possible(starts: PointingStarts, chosen: Selection) -> bool:
-    """Tells whether a selection is, by its own joint angles and by a search for others."""
+    """Returns whether a selection is feasible, by its own angles and by inverse kinematics."""
     x0, b0, q = chosen.start.x0, chosen.start.b0, chosen.start.q
     assert q is not None
     tool = starts.scenario.arm().tip_pose(q)[:3] + b0

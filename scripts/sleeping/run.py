@@ -2,8 +2,8 @@
 
     python scripts/sleeping/run.py out/sleeping --report notebooks/results/sleeping.md
 
-Random starts and goals in calibration environments. Prints and writes how many outcomes differ and
-how far the figures of the records are apart. Reaches are kept and not run again.
+Random starts and goals in calibration environments. Reports how many outcomes differ and by how
+much the fields of the records do. Existing reaches are reused.
 """
 
 from pathlib import Path
@@ -18,7 +18,7 @@ from scripts.common import add_workers, keep_reaches, make_parser, run_script, w
 FIGURES = ("final_x", "final_y", "final_phi", "min_distance", "peak_force", "duration_s")
 
 TIGHT = 1e-9
-"""Two records agree closely when their final poses do, to this (metres, radians)."""
+"""Tolerance within which two final poses agree, metres and radians."""
 
 
 def main() -> None:

@@ -17,7 +17,7 @@ from scripts.cross_validation.scores import CalibrationBin
 from scripts.learning_curve.run import LearningPoint
 
 COLORS = {"rnd": "tab:gray", "cost": "tab:orange", "gp": "tab:blue", "knn": "tab:green"}
-"""Colours of the strategies; others take the next of matplotlib's cycle."""
+"""Colours of the strategies; others take the next colour of matplotlib's cycle."""
 
 _MARKERS = "osD^vP"
 

@@ -4,7 +4,7 @@ The start is the one with the highest probability of success under the mixture o
 
     max over x0 of  sum_c P(c) P(success | s, x0, c),
 
-and every failure updates P(c) by Bayes' rule with what each category says of it.
+and every failure updates P(c) by Bayes' rule, with its likelihood under each category.
 """
 
 from collections.abc import Mapping
@@ -21,8 +21,8 @@ from lic_drake.types import Vector
 from scripts.unknown_category.final_position import FinalPositions
 
 LEAST_PROBABILITY = 0.02
-"""Estimates of success or failure count as no smaller than this in Bayes' rule: an estimator that
-is sure of itself must not rule out a category by one reach."""
+"""Lower bound on the probabilities in Bayes' rule: an overconfident estimator must not rule out a
+category by a single reach."""
 
 
 def posterior(prior: Vector, log_likelihood: Vector) -> Vector:
@@ -85,7 +85,7 @@ class MixtureLic(PlanarLic):
 
     Attributes:
         categories: The categories by name; their probabilities add up to 1.
-        updates: Whether failures change what is believed.
+        updates: Whether failures update the belief.
     """
 
     def __init__(
@@ -107,8 +107,8 @@ class MixtureLic(PlanarLic):
         """Returns P(c) after the failures of a situation.
 
         Each failure counts with the probability of failing where it began and, if its final
-        position is known, the density of ending there. That is independent of the order in which
-        categories are named, not of that of failures: LIC-2 knows the ones before.
+        position is known, the density of ending there. The order of the failures matters, because
+        LIC-2 takes the earlier ones into account.
         """
         belief = self._prior
         if self.updates:

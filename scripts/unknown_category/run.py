@@ -2,8 +2,8 @@
 
     python scripts/unknown_category/run.py
 
-Goals are those of passages in both, so that they tell nothing of the category. Run again, it goes
-on where it was.
+Goals are drawn from passages in both, so that they carry no information about the category. An
+interrupted run can be resumed.
 """
 
 from collections.abc import Callable, Mapping, Sequence
