@@ -78,8 +78,7 @@ def keep_reaches(
         def show(progress: Progress) -> None:
             bar.update(progress.done - bar.n)
 
-        report = simulate(ordered, library, pool, reach=reach, progress=show)
-    refuse_failed(report.failed)
+        refuse_failed(simulate(ordered, library, pool, reach=reach, progress=show).failed)
     library.compact()
     found = {record.key: record for record in library.records()}
     return [found[request.key] for request in requests]

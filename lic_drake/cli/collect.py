@@ -20,7 +20,7 @@ from lic_drake.cli.progress import ProgressDisplay
 
 if TYPE_CHECKING:
     from lic_drake.experience.collect import CollectionRequest
-    from lic_drake.experience.runner import Report
+    from lic_drake.experience.runner import Progress
 
 DEFAULT_SCENARIO = "cylinder-clutter"
 """Scenario of a new library when none is asked for."""
@@ -104,7 +104,7 @@ def run(args: argparse.Namespace) -> int:
     )
     try:
         with workers_of(args) as workers, ProgressDisplay(_remarks(args)) as display:
-            report = collect(
+            progress = collect(
                 ExperienceLibrary(args.library),
                 request,
                 workers,
@@ -117,7 +117,7 @@ def run(args: argparse.Namespace) -> int:
             file=sys.stderr,
         )
         return exit_codes.INTERRUPTED
-    return _conclude(report, args)
+    return _conclude(progress, args)
 
 
 def _remarks(args: argparse.Namespace) -> TextIO:
@@ -155,11 +155,10 @@ def _make_request(args: argparse.Namespace) -> "CollectionRequest":
     return CollectionRequest(**{**(vars(stored) if stored else {}), **values})
 
 
-def _conclude(report: "Report", args: argparse.Namespace) -> int:
+def _conclude(progress: "Progress", args: argparse.Namespace) -> int:
     """Prints the result and returns the exit code."""
     from lic_drake.intervals import wilson_interval
 
-    progress = report.progress
     low, high = wilson_interval(progress.successes, progress.done)
     rate = progress.successes / progress.done if progress.done else math.nan
     if args.json:
@@ -171,7 +170,7 @@ def _conclude(report: "Report", args: argparse.Namespace) -> int:
             "successes": progress.successes,
             "success_interval": [low, high] if progress.done else None,
             "elapsed_s": progress.elapsed_s,
-            "failed": {task.name: task.reason for task in report.failed},
+            "failed": dict(progress.failed),
         }
         print(json.dumps(values))
     else:
@@ -181,8 +180,8 @@ def _conclude(report: "Report", args: argparse.Namespace) -> int:
             f" {progress.successes} successes: {rate:.1%}"
             f" (90 % interval {low:.1%} to {high:.1%})"
         )
-    for failed in report.failed:
-        print(f"lic: environment {failed.name} failed: {failed.reason}", file=sys.stderr)
+    for name, reason in progress.failed.items():
+        print(f"lic: environment {name} failed: {reason}", file=sys.stderr)
     if progress.done < progress.total:
         print("lic: the library is incomplete; run the same command to try again", file=sys.stderr)
         return exit_codes.INCOMPLETE

@@ -140,7 +140,7 @@ def run_info(args: argparse.Namespace) -> int:
 
     summary = summarize(ExperienceLibrary(args.library))
     if args.json:
-        values = {**dataclasses.asdict(summary), "success_rate": summary.success_rate}
+        values = dataclasses.asdict(summary)
         print(json.dumps(values, indent=2))
     else:
         print("\n".join(_lines(args.library, summary)))
@@ -178,11 +178,12 @@ def run_recompute(args: argparse.Namespace) -> int:
             bar.refresh()
 
         library, rng = ExperienceLibrary(args.library), np.random.default_rng(args.seed)
-        found = recompute(library, args.rows, rng, progress=show)
-    print(f"{found.rows - len(found.differing)} of {found.rows} rows are the same to the last bit")
-    for row in found.differing:
+        differing = recompute(library, args.rows, rng, progress=show)
+        rows = int(bar.n)
+    print(f"{rows - len(differing)} of {rows} rows are the same to the last bit")
+    for row in differing:
         print(f"{row.key}: {' -> '.join(row.outcomes)}, other {', '.join(row.fields)}")
-    return exit_codes.INCOMPLETE if found.differing else 0
+    return exit_codes.INCOMPLETE if differing else 0
 
 
 def run_merge(args: argparse.Namespace) -> int:
@@ -220,12 +221,12 @@ def _check_lines(report: "LibraryReport", library: Path) -> list[str]:
         f"scenarios   {', '.join(report.scenarios) or 'none'}",
         f"duplicates  {len(report.duplicates)} {' '.join(report.duplicates[:5])}".rstrip(),
         f"damaged     {len(report.damaged)}",
-        *(f"            {file.reason}" for file in report.damaged),
+        *(f"            {reason}" for reason in report.damaged.values()),
     ]
     go_on = f"lic collect {shlex.quote(str(library))}"
     if report.damaged and library.is_dir():
         aside = shlex.quote(str(library / "_damaged"))
-        names = shlex.join(str(library / file.name) for file in report.damaged)
+        names = shlex.join(str(library / name) for name in report.damaged)
         lines.append(f"DAMAGED; repair with: mkdir -p {aside} && mv {names} {aside} && {go_on}")
     elif report.damaged:
         lines.append("DAMAGED; restore the file, or collect its reaches again")

@@ -20,26 +20,13 @@ NOT_COMPARED = ("wall_time_s", "lic_drake_version", "drake_version", "weight")
 
 
 @dataclass(frozen=True, kw_only=True)
-class DamagedFile:
-    """A file that cannot be read.
-
-    Attributes:
-        name: Its name in the library's folder.
-        reason: One line.
-    """
-
-    name: str
-    reason: str
-
-
-@dataclass(frozen=True, kw_only=True)
 class LibraryReport:
     """What `check_library` found.
 
     Attributes:
         shards: Number of Parquet files.
         reaches: Number of rows in the readable ones.
-        damaged: Parquet files that cannot be read.
+        damaged: Names of Parquet files that cannot be read, and why, in a line.
         scenarios: Digests of the scenarios in the library; more than one is an error.
         duplicates: Keys of reaches that the library holds more than once, sorted.
         requested: Number of reaches of the request; None without a request.
@@ -49,7 +36,7 @@ class LibraryReport:
 
     shards: int
     reaches: int
-    damaged: tuple[DamagedFile, ...]
+    damaged: dict[str, str]
     scenarios: tuple[str, ...]
     duplicates: tuple[str, ...]
     requested: int | None
@@ -80,7 +67,7 @@ def check_library(
         LibraryError: There is no library.
     """
     paths = library.shard_paths()
-    damaged: list[DamagedFile] = []
+    damaged: dict[str, str] = {}
     scenarios: set[str] = set()
     keys: Counter[str] = Counter()
     for path in paths:
@@ -88,7 +75,7 @@ def check_library(
             keys.update(read_table(path).column("key").to_pylist())
             scenarios.add(read_header(path).scenario_digest)
         except LibraryError as error:
-            damaged.append(DamagedFile(name=path.name, reason=str(error)))
+            damaged[path.name] = str(error)
     lacking: dict[int, int] = {}
     requested = 0
     if request is not None:
@@ -100,7 +87,7 @@ def check_library(
     return LibraryReport(
         shards=len(paths),
         reaches=keys.total(),
-        damaged=tuple(damaged),
+        damaged=damaged,
         scenarios=tuple(sorted(scenarios)),
         duplicates=tuple(sorted(key for key, count in keys.items() if count > 1)),
         requested=None if request is None else requested,
@@ -124,19 +111,6 @@ class Difference:
     outcomes: tuple[str, str]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Recomputation:
-    """What `recompute` found.
-
-    Attributes:
-        rows: Number of rows that were simulated again.
-        differing: Those that came out otherwise, environment by environment.
-    """
-
-    rows: int
-    differing: tuple[Difference, ...]
-
-
 def recompute(
     library: ExperienceLibrary,
     count: int,
@@ -144,7 +118,7 @@ def recompute(
     *,
     reach: ReachFunction = run_reach,
     progress: Callable[[int, int], None] = lambda done, total: None,
-) -> Recomputation:
+) -> list[Difference]:
     """Simulates random simulated rows of a library again: a record is a function of its request.
 
     Equality to the last bit may be asked for on the machine that collected the library: other
@@ -156,6 +130,9 @@ def recompute(
         rng: Draws them.
         reach: Simulates a request.
         progress: Is called after each row with the number of rows done and in all.
+
+    Returns:
+        The rows that differ, environment by environment.
 
     Raises:
         LibraryError: The library is empty, or cannot be read.
@@ -173,7 +150,7 @@ def recompute(
             outcomes = (row.outcome, again.outcome)
             differing.append(Difference(key=row.key, fields=others, outcomes=outcomes))
         progress(done, len(drawn))
-    return Recomputation(rows=len(drawn), differing=tuple(differing))
+    return differing
 
 
 def _is_same(a: object, b: object) -> bool:

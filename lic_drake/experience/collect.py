@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from lic_drake.config import read_mapping
 from lic_drake.errors import LibraryError, RequestError, ScenarioError
 from lic_drake.experience.files import readable_errors, write_atomically
-from lic_drake.experience.runner import ProgressFunction, ReachFunction, Report, simulate
+from lic_drake.experience.runner import Progress, ProgressFunction, ReachFunction, simulate
 from lic_drake.experience.schema import scenario_text
 from lic_drake.experience.store import WHOLE, ExperienceLibrary, Share
 from lic_drake.experience.workers import Workers
@@ -138,8 +138,8 @@ def collect(
     *,
     share: Share = WHOLE,
     reach: ReachFunction = run_reach,
-    progress: ProgressFunction | None = None,
-) -> Report:
+    progress: ProgressFunction = lambda progress: None,
+) -> Progress:
     """Simulates the reaches of a request that are not yet in a library; see `simulate`.
 
     Args:

@@ -6,10 +6,11 @@ a kill may cost is therefore the environments under way; to resume is to ask for
 
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from dataclasses import dataclass, field
 from itertools import groupby
+from types import MappingProxyType
 from typing import Any
 
 import lic_drake
@@ -33,33 +34,15 @@ TRIES = 3
 
 @dataclass(frozen=True)
 class Task:
-    """A call to make in a worker.
-
-    Attributes:
-        name: What messages call it, for instance the name of its shard.
-        arguments: Of the work function.
-    """
+    """A call to make in a worker: its name, for instance that of its shard, and its arguments."""
 
     name: str
     arguments: tuple[Any, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
-class FailedTask:
-    """A task that could not be finished.
-
-    Attributes:
-        name: Its name.
-        reason: One line.
-    """
-
-    name: str
-    reason: str
-
-
-@dataclass(frozen=True, kw_only=True)
 class Progress:
-    """A run at one moment.
+    """A run at one moment, or at its end.
 
     Attributes:
         total: Number of reaches that were asked for.
@@ -68,6 +51,7 @@ class Progress:
         successes: How many of those reached their goal.
         at_work: Number of environments that are being simulated.
         elapsed_s: Wall time of this run, seconds.
+        failed: Names of the environments that were left out at the end, and why, in a line.
     """
 
     total: int
@@ -76,26 +60,22 @@ class Progress:
     successes: int
     at_work: int
     elapsed_s: float
+    failed: Mapping[str, str]
 
     @property
     def reaches_per_minute(self) -> float:
         """Rate of this run; 0 before its first shard."""
         return 60.0 * (self.done - self.present) / self.elapsed_s if self.elapsed_s > 0 else 0.0
 
-    @property
-    def time_left_s(self) -> float | None:
-        """Expected wall time to the end, seconds; None while nothing is known."""
-        rate = self.reaches_per_minute
-        return 60.0 * (self.total - self.done) / rate if rate > 0 else None
-
     def describe(self) -> str:
         """Returns one line for people."""
-        left = self.time_left_s
-        clock = "?" if left is None else f"{int(left) // 3600}:{int(left) // 60 % 60:02d} h"
+        rate, clock = self.reaches_per_minute, "?"
+        if rate > 0:
+            left_min = int((self.total - self.done) / rate)
+            clock = f"{left_min // 60}:{left_min % 60:02d} h"
         return (
-            f"{self.done}/{self.total} reaches, {self.successes} successes,"
-            f" {self.reaches_per_minute:.0f} reaches/min in {self.at_work} environments, {clock}"
-            " left"
+            f"{self.done}/{self.total} reaches, {self.successes} successes, {rate:.0f} reaches/min"
+            f" in {self.at_work} environments, {clock} left"
         )
 
 
@@ -103,25 +83,12 @@ ProgressFunction = Callable[[Progress], None]
 """Is called about twice a second during a run, and at its end."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Report:
-    """What a run did.
-
-    Attributes:
-        progress: The state at its end.
-        failed: Environments that were left out; the library lacks their reaches.
-    """
-
-    progress: Progress
-    failed: tuple[FailedTask, ...]
-
-
-def refuse_failed(failed: Sequence[FailedTask]) -> None:
-    """Raises a `LibraryError` if environments were left out."""
-    if failed:
+def refuse_failed(failed: Mapping[str, str]) -> None:
+    """Raises a `LibraryError` if tasks were left out; takes names and reasons."""
+    for name, reason in failed.items():
         raise LibraryError(
-            f"{len(failed)} environments failed, for instance {failed[0].name}:"
-            f" {failed[0].reason}; run it again to try them again"
+            f"{len(failed)} environments failed, for instance {name}: {reason}; run it again to"
+            " try them again"
         )
 
 
@@ -133,8 +100,8 @@ def simulate(
     total: int | None = None,
     share: Share = WHOLE,
     reach: ReachFunction = run_reach,
-    progress: ProgressFunction | None = None,
-) -> Report:
+    progress: ProgressFunction = lambda progress: None,
+) -> Progress:
     """Simulates the requests that are not yet in a library.
 
     The library does not depend on workers or interruptions (but for wall times).
@@ -150,6 +117,9 @@ def simulate(
         reach: Simulates one of them.
         progress: Shows how far the run is.
 
+    Returns:
+        The state at the end.
+
     Raises:
         LibraryError: The library is in use, holds a damaged file or another scenario, or cannot
             be written; shards that were finished are kept.
@@ -164,9 +134,9 @@ def simulate(
             simulate_environment,
             workers or ThisProcess(),
             run.finish,
-            lambda at_work: progress(run.progress(at_work)) if progress else None,
+            lambda at_work: progress(run.progress(at_work)),
         )
-    return Report(progress=run.progress(at_work=0), failed=tuple(failed))
+        return run.progress(at_work=0, failed=failed)
 
 
 def simulate_environment(reach: ReachFunction, requests: list[ReachRequest]) -> list[ReachRecord]:
@@ -219,7 +189,8 @@ class _Run:
         self.done += len(records)
         self.successes += sum(record.success for record in records)
 
-    def progress(self, at_work: int) -> Progress:
+    def progress(self, at_work: int, failed: Mapping[str, str] = MappingProxyType({})) -> Progress:
+        """Returns the present state."""
         return Progress(
             total=max(self.total, self.done),
             present=self.present,
@@ -227,6 +198,7 @@ class _Run:
             successes=self.successes,
             at_work=at_work,
             elapsed_s=time.monotonic() - self.began_s,
+            failed=failed,
         )
 
 
@@ -256,7 +228,7 @@ def run_tasks[R](
     workers: Workers,
     finish: Callable[[Task, R], None],
     report: Callable[[int], None] = lambda at_work: None,
-) -> list[FailedTask]:
+) -> dict[str, str]:
     """Calls `work` with each task's arguments in workers, and `finish` here as the calls end.
 
     A call during which a worker process died is repeated: whoever was at work then, since it is
@@ -270,7 +242,7 @@ def run_tasks[R](
         report: Is called with the number of running calls about twice a second.
 
     Returns:
-        The tasks that were left out.
+        Names of the tasks that were left out, and why, in a line.
 
     Raises:
         LicError: `finish` or `work` raised it; no other task would fare better.
@@ -278,7 +250,7 @@ def run_tasks[R](
     new, again = iter(tasks), deque[Task]()
     running: dict[Future[R], Task] = {}
     deaths: Counter[str] = Counter()
-    failed: list[FailedTask] = []
+    failed: dict[str, str] = {}
 
     def take() -> Task | None:
         if any(deaths[task.name] == TRIES - 1 for task in running.values()):
@@ -298,14 +270,12 @@ def run_tasks[R](
             if deaths[task.name] < TRIES:
                 again.append(task)
             else:
-                reason = f"its worker process died {TRIES} times"
-                failed.append(FailedTask(name=task.name, reason=reason))
+                failed[task.name] = f"its worker process died {TRIES} times"
             return True
         except LicError:
             raise
         except Exception as error:
-            reason = " ".join(f"{type(error).__name__}: {error}".split())
-            failed.append(FailedTask(name=task.name, reason=reason))
+            failed[task.name] = " ".join(f"{type(error).__name__}: {error}".split())
         return False
 
     waiting = take()

@@ -87,8 +87,9 @@ WHOLE = Share()
 class ExperienceLibrary:
     """Reaches of one scenario: a folder of shards, or a single Parquet file.
 
-    Opening reads nothing; every call looks at the files as they are then. The folder also opens
-    with `pandas.read_parquet`. Shards are only ever added or replaced as a whole.
+    Opening reads nothing; every call looks at the files as they are then, and raises a LibraryError
+    if there are none, one is damaged, or they hold different scenarios. The folder also opens with
+    `pandas.read_parquet`. Shards are only ever added or replaced as a whole.
 
     Attributes:
         path: The folder or file.
@@ -98,11 +99,7 @@ class ExperienceLibrary:
         self.path = Path(path)
 
     def shard_paths(self) -> list[Path]:
-        """Returns the library's Parquet files, sorted by name.
-
-        Raises:
-            LibraryError: There is no such folder or file, or it may not be read.
-        """
+        """Returns the library's Parquet files, sorted by name; perhaps none."""
         with readable_errors(self.path, "read"):
             if self.path.is_file():
                 return [self.path]
@@ -122,11 +119,7 @@ class ExperienceLibrary:
         return sum(len(read_table(path, [])) for path in self.shard_paths())
 
     def successes(self) -> dict[str, bool]:
-        """Returns the key of every reach in the library, and whether it reached its goal.
-
-        Raises:
-            LibraryError: A file is damaged.
-        """
+        """Returns the key of every reach in the library, and whether it reached its goal."""
         found: dict[str, bool] = {}
         for path in self.shard_paths():
             table = read_table(path, ["key", "success"])
@@ -135,11 +128,7 @@ class ExperienceLibrary:
         return found
 
     def header(self) -> TableHeader:
-        """Returns the metadata of the shards, which must agree on the scenario.
-
-        Raises:
-            LibraryError: The library is empty or unreadable, or holds more than one scenario.
-        """
+        """Returns the metadata of the shards, which must agree on the scenario."""
         paths = self.shard_paths()
         if not paths:
             raise LibraryError(
@@ -159,7 +148,6 @@ class ExperienceLibrary:
         """Returns the scenario that the reaches were simulated with.
 
         Raises:
-            LibraryError: As `header`.
             ScenarioError: This lic_drake does not know the scenario's category or parameters.
         """
         header = self.header()
@@ -173,11 +161,7 @@ class ExperienceLibrary:
         return scenario
 
     def table(self) -> pa.Table:
-        """Returns all rows, sorted by shard.
-
-        Raises:
-            LibraryError: As `header`.
-        """
+        """Returns all rows, sorted by shard."""
         self.header()
         tables = [read_table(path) for path in self.shard_paths()]
         return pa.concat_tables([table.replace_schema_metadata() for table in tables])
@@ -187,19 +171,12 @@ class ExperienceLibrary:
 
         Text columns are object arrays of str; `q_start` and `q_final` are object arrays of
         arrays, because a reach that never began has no joint angles.
-
-        Raises:
-            LibraryError: As `header`.
         """
         table = self.table()
         return {name: table.column(name).to_numpy() for name in table.column_names}
 
     def records(self) -> list[ReachRecord]:
-        """Returns every row as a record.
-
-        Raises:
-            LibraryError: As `header`.
-        """
+        """Returns every row as a record."""
         return to_records(self.table())
 
     def shard_path(self, name: str) -> Path:
@@ -207,15 +184,12 @@ class ExperienceLibrary:
         return self.path / f"{name}{SUFFIX}"
 
     def write_shard(self, name: str, records: Sequence[ReachRecord], scenario: Scenario) -> Path:
-        """Writes a shard; it replaces one of the same name, as a whole or not at all.
+        """Writes a shard, replacing one of the same name as a whole, and returns its path.
 
         Args:
             name: File name without suffix; without a leading dot or underscore.
             records: The rows.
             scenario: The scenario of all records.
-
-        Returns:
-            The shard's path.
 
         Raises:
             LibraryError: The folder cannot be written (permission, disk full), or a record
@@ -237,11 +211,7 @@ class ExperienceLibrary:
         return path
 
     def compact(self) -> None:
-        """Writes all shards of a folder as one; a kill on the way loses nothing.
-
-        Raises:
-            LibraryError: As `header`, or the folder cannot be written.
-        """
+        """Writes all shards of a folder as one; a kill on the way loses nothing."""
         paths = self.shard_paths()
         if len(paths) < 2 or self.path.is_file():
             return
@@ -284,11 +254,7 @@ class ExperienceLibrary:
             yield
 
     def create(self) -> None:
-        """Makes the folder if it is not there.
-
-        Raises:
-            LibraryError: The path is a file, or the folder cannot be made.
-        """
+        """Makes the folder if it is not there."""
         with readable_errors(self.path, "create the folder"):
             self.path.mkdir(parents=True, exist_ok=True)
 
@@ -307,8 +273,8 @@ def merge_libraries(sources: Sequence[ExperienceLibrary], output: Path) -> int:
         The number of rows written.
 
     Raises:
-        LibraryError: The scenarios differ, two libraries hold different results of the same
-            reach, or a file cannot be read or written.
+        LibraryError: The scenarios differ, two libraries hold different results of a reach, or a
+            file cannot be read or written.
     """
     if output.suffix != SUFFIX:
         raise LibraryError(f"the merged file needs the suffix {SUFFIX}, got {output}")

@@ -5,7 +5,7 @@ import pytest
 from lic_drake.cli.progress import LOG_EVERY_S, ProgressDisplay
 from lic_drake.experience.runner import Progress
 
-START = Progress(at_work=2, total=100, present=10, done=10, successes=4, elapsed_s=0.0)
+START = Progress(at_work=2, total=100, present=10, done=10, successes=4, elapsed_s=0.0, failed={})
 
 
 def test_a_log_gets_a_line_a_minute(capsys: pytest.CaptureFixture[str]) -> None:

@@ -17,7 +17,7 @@ from support.fake_reach import FakeReach, comparable, expected_records, make_req
 from lic_drake.errors import ClusterError
 from lic_drake.experience.collect import collect
 from lic_drake.experience.dask_workers import DaskWorkers
-from lic_drake.experience.runner import ReachFunction, Report
+from lic_drake.experience.runner import Progress, ReachFunction
 from lic_drake.experience.store import ExperienceLibrary
 
 REQUEST = make_request()
@@ -47,7 +47,7 @@ def reach(tmp_path: Path) -> FakeReach:
     return FakeReach(log=tmp_path / "calls")
 
 
-def run(dask: DaskCluster, library: ExperienceLibrary, reach: ReachFunction) -> Report:
+def run(dask: DaskCluster, library: ExperienceLibrary, reach: ReachFunction) -> Progress:
     with DaskWorkers(dask.address) as workers:
         return collect(library, REQUEST, workers, reach=reach)
 
@@ -56,7 +56,7 @@ def test_a_cluster_makes_the_same_library_in_its_own_processes(
     dask: DaskCluster, library: ExperienceLibrary, reach: FakeReach
 ) -> None:
     report = run(dask, library, replace(reach, sleep_s=0.02))
-    assert (report.progress.done, report.failed) == (36, ())
+    assert (report.done, report.failed) == (36, {})
     assert comparable(library.records()) == expected_records(REQUEST)
     assert len(reach.calls()) == len(set(reach.calls())) == 36
     assert len(reach.processes()) == 2
@@ -67,7 +67,7 @@ def test_a_killed_worker_of_a_cluster_costs_only_its_environment(
     dask: DaskCluster, library: ExperienceLibrary, reach: FakeReach
 ) -> None:
     deadly = replace(reach, deadly=REACHES[7].key, deaths=1)
-    assert run(dask, library, deadly).failed == ()
+    assert run(dask, library, deadly).failed == {}
     assert comparable(library.records()) == expected_records(REQUEST)
     assert reach.log.with_suffix(".deaths").read_text() == "x"
 
@@ -77,13 +77,9 @@ def test_an_environment_that_aborts_the_interpreter_is_left_out(
 ) -> None:
     deadly = replace(reach, deadly=REACHES[7].key, deaths=99, death=signal.SIGABRT)
     report = run(dask, library, deadly)
-    (failed,) = report.failed
-    assert (failed.name, failed.reason) == (
-        "training-000000",
-        "RuntimeError: its worker processes died",
-    )
+    assert report.failed == {"training-000000": "RuntimeError: its worker processes died"}
     assert {record.environment for record in library.records()} == {1, 2}
-    assert run(dask, library, reach).failed == ()
+    assert run(dask, library, reach).failed == {}
     assert comparable(library.records()) == expected_records(REQUEST)
 
 
@@ -150,5 +146,5 @@ def test_workers_that_join_later_are_used_and_a_lost_scheduler_loses_no_shard(
         waiting, lost = error.splitlines()
         assert "no workers yet, waiting for some; start them with: dask worker tcp" in waiting
         assert f"lost the connection to the scheduler at {dask.address}; finished" in lost
-    assert 12 <= collect(library, REQUEST, reach=reach).progress.present < 36
+    assert 12 <= collect(library, REQUEST, reach=reach).present < 36
     assert comparable(library.records()) == expected_records(REQUEST)

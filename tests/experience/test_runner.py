@@ -42,14 +42,14 @@ def test_a_collection_fills_the_library_and_a_second_run_simulates_nothing(
     assert comparable(library.records()) == expected_records(REQUEST)
     assert names(library) == [REQUEST_FILE, *SHARDS]
     assert read_request(library.path / REQUEST_FILE) == REQUEST
-    assert (report.failed, report.progress.present, report.progress.done) == ((), 0, 36)
-    assert report.progress.successes == sum(record.success for record in library.records())
+    assert (report.failed, report.present, report.done) == ({}, 0, 36)
+    assert report.successes == sum(record.success for record in library.records())
     assert [progress.done for progress in seen] == [12, 24, 36]
-    assert seen[-1].time_left_s == 0.0
+    assert seen[-1].describe().endswith("0:00 h left")
 
-    again = collect(library, REQUEST, reach=reach).progress
+    again = collect(library, REQUEST, reach=reach)
     assert len(reach.calls()) == 36
-    assert (again.present, again.done, again.successes) == (36, 36, report.progress.successes)
+    assert (again.present, again.done, again.successes) == (36, 36, report.successes)
 
 
 def test_more_environments_add_to_the_library(library: ExperienceLibrary, reach: FakeReach) -> None:
@@ -96,11 +96,11 @@ def test_shares_divide_the_environments_and_any_collection_completes_them(
 ) -> None:
     larger = replace(REQUEST, environments=5)
     report = collect(library, larger, share=Share(2, 3), reach=reach)
-    assert (report.progress.total, report.progress.done) == (24, 24)
+    assert (report.total, report.done) == (24, 24)
     assert names(library) == [REQUEST_FILE, "training-000001.parquet", "training-000004.parquet"]
-    assert collect(library, larger, share=Share(7, 7), reach=reach).progress.total == 0
+    assert collect(library, larger, share=Share(7, 7), reach=reach).total == 0
     rest = collect(library, larger, reach=reach)
-    assert (rest.progress.total, rest.progress.present) == (60, 24)
+    assert (rest.total, rest.present) == (60, 24)
     assert comparable(library.records()) == expected_records(larger)
     assert len(reach.calls()) == 60
 
@@ -121,10 +121,8 @@ def test_an_environment_that_raises_is_reported_and_the_rest_goes_on(
     library: ExperienceLibrary, reach: FakeReach
 ) -> None:
     report = collect(library, REQUEST, reach=replace(reach, failing_environment=1))
-    assert [(f.name, f.reason) for f in report.failed] == [
-        ("training-000001", "ArithmeticError: no such environment")
-    ]
-    assert report.progress.done == 24
+    assert report.failed == {"training-000001": "ArithmeticError: no such environment"}
+    assert report.done == 24
     assert {record.environment for record in library.records()} == {0, 2}
 
 
@@ -158,7 +156,7 @@ def test_a_full_disk_is_one_line_and_loses_no_finished_environment(
     assert "\n" not in str(error.value)
     assert names(library) == [REQUEST_FILE, SHARDS[0]]
     monkeypatch.undo()
-    assert collect(library, REQUEST, reach=reach).progress.present == 12
+    assert collect(library, REQUEST, reach=reach).present == 12
     assert comparable(library.records()) == expected_records(REQUEST)
     assert len(reach.calls()) == 36 + 12
 

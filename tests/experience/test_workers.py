@@ -46,7 +46,7 @@ def test_the_library_does_not_depend_on_the_number_of_workers(
     libraries = [ExperienceLibrary(tmp_path / name) for name in ("one", "two")]
     for count, library in enumerate(libraries, start=1):
         with LocalWorkers(count) as workers:
-            assert collect(library, REQUEST, workers, reach=reach).progress.done == 36
+            assert collect(library, REQUEST, workers, reach=reach).done == 36
         assert comparable(library.records()) == expected_records(REQUEST)
     assert len(reach.processes()) == 3
     assert os.getpid() not in reach.processes()
@@ -57,7 +57,7 @@ def test_a_killed_worker_costs_only_the_environments_under_way(
 ) -> None:
     deadly = replace(reach, deadly=REQUEST.reaches(1)[7].key, deaths=1)
     with LocalWorkers(2) as workers:
-        assert collect(library, REQUEST, workers, reach=deadly).failed == ()
+        assert collect(library, REQUEST, workers, reach=deadly).failed == {}
     assert comparable(library.records()) == expected_records(REQUEST)
     assert reach.log.with_suffix(".deaths").read_text() == "x"
 
@@ -68,12 +68,11 @@ def test_a_deadly_environment_is_left_out_and_the_rest_goes_on(
     deadly = replace(reach, deadly=REACHES[7].key, deaths=99)
     with LocalWorkers(2) as workers:
         report = collect(library, REQUEST, workers, reach=deadly)
-    (failed,) = report.failed
-    assert (failed.name, failed.reason) == ("training-000000", "its worker process died 3 times")
-    assert report.progress.done == 24
+    assert report.failed == {"training-000000": "its worker process died 3 times"}
+    assert report.done == 24
     assert {record.environment for record in library.records()} == {1, 2}
     assert reach.log.with_suffix(".deaths").read_text() == "xxx"
-    assert collect(library, REQUEST, reach=reach).failed == ()
+    assert collect(library, REQUEST, reach=reach).failed == {}
     assert comparable(library.records()) == expected_records(REQUEST)
 
 
@@ -94,7 +93,7 @@ def test_ctrl_c_stops_quietly_and_the_same_command_goes_on(
     report = check(library.path)
     kept = report["reaches"]
     assert 12 <= kept < 36
-    assert (report["damaged"], report["duplicates"]) == ([], [])
+    assert (report["damaged"], report["duplicates"]) == ({}, [])
 
     output, error = start(library.path, reach, "--workers", "2").communicate(timeout=60)
     assert error == ""
@@ -112,7 +111,7 @@ def test_a_killed_collection_leaves_no_workers_and_loses_no_finished_environment
     wait_until(lambda: not any(map(is_alive, reach.processes())), timeout_s=10.0)
     finished = len(library.records())
     with LocalWorkers(2) as workers:
-        assert collect(library, REQUEST, workers, reach=reach).progress.present == finished >= 12
+        assert collect(library, REQUEST, workers, reach=reach).present == finished >= 12
     assert comparable(library.records()) == expected_records(REQUEST)
 
 
