@@ -1,6 +1,7 @@
 """Local sub-sampling: an estimator fitted to the nearest samples only (paper III-D, [15])."""
 
 from collections.abc import Callable, Iterator
+from copy import copy
 from dataclasses import dataclass
 from itertools import product
 from typing import Any, Self, cast
@@ -159,7 +160,7 @@ class LocalEstimator(SuccessEstimator):
             if len(self._cache) >= _CACHE_SIZE:
                 del self._cache[next(iter(self._cache))]
             rows = near.nearest(cell, self.size)
-            self._cache[key] = clone(self.model_)._learn(
+            self._cache[key] = copy(self.model_)._learn(
                 near.X[rows], near.y[rows], None, near.weight[rows]
             )
         return self._cache[key]

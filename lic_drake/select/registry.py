@@ -154,12 +154,11 @@ def fit_model(
         features: What x is made of.
         columns: Of a library D1, or the pairs D2 where the features observe a first reach.
     """
-    rows = features.rows(columns)
-    # A library without any simulated row chooses its settings from all.
-    known = rows.simulated if rows.simulated.any() else np.ones_like(rows.simulated)
-    fitted = make_estimator(estimator, features).fit(
-        rows.X[known], rows.y[known], rows.groups[known], rows.weight[known]
-    )
-    if not known.all():
+    rows, fitted = features.rows(columns), make_estimator(estimator, features)
+    part = rows.simulated
+    if part.all() or not part.any():  # Without any simulated row all choose the settings.
+        fitted.fit(rows.X, rows.y, rows.groups, rows.weight)
+    else:
+        fitted.fit(rows.X[part], rows.y[part], rows.groups[part], rows.weight[part])
         fitted = fitted.conditioned_on(rows.X, rows.y, rows.weight)
     return SuccessModel(estimator=fitted, features=features)
