@@ -209,10 +209,10 @@ def _check(row: Mapping[str, float], scenario: Scenario, where: str) -> None:
                 f"{where}: {name} is {row[name]:g} rad, which must be from -3.1416 to 3.1416;"
                 " directions are in radians, not degrees"
             )
-    p_WR = np.array([row["base_x"], row["base_y"], 0.0])
+    b0 = np.array([row["base_x"], row["base_y"], row.get("torso", 0.0)])
     p_WG = np.array([row["goal_x"], row["goal_y"], row.get("goal_z", 0.0)])
     try:
-        check_goal(scenario, p_WG - p_WR, row.get("torso"))
+        check_goal(scenario, p_WG - b0)
     except RequestError as error:
         raise LibraryError(f"{where}: {error}, or leave the row out") from None
     if "torso" in row:
