@@ -149,7 +149,6 @@ class _Watches:
         """Returns the wall seconds in each of `PARTS` so far."""
         sensor = self._taxels.seconds + self._sense.seconds
         stepping = self._drake.seconds + self._mujoco.seconds
-        # Drake calls the controller within its steps, MuJoCo's reach between them.
         return np.array([stepping, sensor, self._mpc.seconds])
 
 
@@ -162,8 +161,6 @@ def _make_row(
     setup_s: float | None,
 ) -> Timing:
     stepping, sensor, mpc = parts.tolist()
-    if engine.mujoco is None:  # Drake calls the controller within its steps.
-        stepping -= mpc
     return Timing(
         engine=engine.name,
         reach=number,

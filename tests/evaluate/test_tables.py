@@ -96,15 +96,3 @@ def test_margins_of_the_papers_counts_are_the_papers() -> None:
         assert low < float(row["ours"]) < high
     assert found["1st attempt", "LIC(GP) - RND"]["paper"] == "+16.80"
     assert found["total", "LIC(GP) - COST"]["paper"] == "+6.30"
-
-
-def test_margins_are_paired() -> None:
-    found = cells(margins_table(SMALL, TABLE_IV))
-    assert list(found) == [
-        ("1st attempt", "LIC(GP) - RND"),
-        ("1st attempt", "LIC(GP) - COST"),
-        ("total", "LIC(GP) - RND"),
-        ("total", "LIC(GP) - COST"),
-    ]
-    row = found["1st attempt", "LIC(GP) - COST"]
-    assert (row["ours"], row["paper"], row["p"]) == ("+37.50", "-", "0.25")

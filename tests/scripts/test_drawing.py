@@ -7,10 +7,8 @@ from matplotlib.figure import Figure
 
 from lic_drake.evaluate.statistics import Count
 from lic_drake.intervals import wilson_interval
-from scripts.cross_validation.scores import CalibrationBin
 from scripts.tables.drawing import (
     AttemptCounts,
-    draw_calibration,
     draw_success_bars,
     draw_success_by_goal,
 )
@@ -63,20 +61,6 @@ def test_success_bars_stand_side_by_side_with_their_intervals(ax: Axes) -> None:
     np.testing.assert_allclose(ends[70.0], 100 * np.array(wilson_interval(70, 100)))
     np.testing.assert_allclose(ends[61.0], 100 * np.array(wilson_interval(1220, 2000)))
     assert ax.get_ylim() == (0.0, 100.0)
-
-
-def test_calibration_shows_observed_against_predicted_with_intervals(ax: Axes) -> None:
-    bins = [
-        CalibrationBin(low=0.1, high=0.2, count=50, predicted=0.16, observed=0.2),
-        CalibrationBin(low=0.9, high=1.0, count=10, predicted=0.95, observed=1.0),
-    ]
-    assert draw_calibration(ax, {"knn": bins}) is ax
-    ((points, ends, _),) = bars(ax)
-    np.testing.assert_allclose(points, [[0.16, 0.2], [0.95, 1.0]])
-    np.testing.assert_allclose(ends, [wilson_interval(10, 50), wilson_interval(10, 10)])
-    np.testing.assert_array_equal(ax.lines[0].get_xydata(), [[0, 0], [1, 1]])
-    assert legend(ax) == ["LIC(K-NN), n = 60"]
-    assert ax.get_aspect() == 1.0
 
 
 def test_the_goal_map_has_rates_and_counts_in_its_cells(ax: Axes) -> None:

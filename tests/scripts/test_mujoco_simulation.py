@@ -67,7 +67,7 @@ def test_the_taxel_of_drakes_sensor_reads_the_force_that_the_joints_show(
     assert np.flatnonzero(mine.taxel_force()) == [taxel]
     # Friction leaves a tangential force that depends on how the contact began.
     p_RC = p_RC + 0.015 * normal
-    J = ARM.point_jacobians(mine.joint_angles(), np.array([link]), p_RC[None])[0]
+    J = ARM.point_jacobians(ARM.calc_pose(mine.joint_angles()), np.array([link]), p_RC[None])[0]
     torque = ARM.stiffness * (q_d - mine.joint_angles())
     f_C = np.linalg.lstsq(J[:2].T, torque, rcond=None)[0]
     assert mine.taxel_force()[taxel] == pytest.approx(float(f_C @ normal[:2]), rel=0.02)

@@ -66,15 +66,6 @@ def test_no_fit_sees_an_environment_that_it_predicts(folds: int, fits: int) -> N
         assert seen | asked == set(range(7))
 
 
-def test_learning_by_heart_gains_nothing_on_coin_tosses() -> None:
-    rng = np.random.default_rng(0)
-    X = np.tile(np.arange(50.0)[:, None], (4, 1))
-    rows = _rows(X, rng.integers(0, 2, 200), np.repeat(np.arange(4), 50))
-    result = score(hold_out_environments(Memory, rows), slice(0, 1))
-    assert result.gain < -1.0
-    assert result.log_loss > np.log(2.0)
-
-
 def test_gain_is_against_the_rate_of_the_other_environments() -> None:
     rows = _rows([[0.0]] * 4, [1, 1, 1, 0], [0, 0, 1, 1])
     held_out = hold_out_environments(Memory, rows)

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
-from support.select_surfaces import Bumps, random_model
+from support.select_surfaces import Bumps
 from support.starts import ARM, LINE
 
 from lic_drake.estimate.features import PLANAR_LIC1, features_of
-from lic_drake.reach.start import Start, Starts
+from lic_drake.reach.start import Start
 from lic_drake.select.objective import SuccessModel
 from lic_drake.select.planar_lic import PlanarLic
 from lic_drake.select.situation import FailedReach, Situation
@@ -64,27 +64,6 @@ def test_bayes_rule_is_that_of_the_closed_form(categories: list[tuple[float, flo
     joint = prior / prior.sum() * np.exp(log_likelihood)
     found = posterior(prior / prior.sum(), log_likelihood)
     np.testing.assert_allclose(found, joint / joint.sum(), rtol=1e-9, atol=1e-300)
-
-
-def test_values_and_gradients_are_the_weighted_sums() -> None:
-    parts = [PlanarLic(ARM, random_model(seed)) for seed in (0, 1)]
-    objective = mixture(0.3, *parts).objective(FIRST)
-    x0 = np.array([LINE.poses.line.x_m, 0.03, 0.9])
-    at = Starts(x0[None], np.zeros((1, 3)))
-    expected = [part.objective(FIRST).values(at)[0] for part in parts]
-    value, by_x0, _ = objective.value_and_gradient(x0, np.zeros(3))
-    assert value == pytest.approx(0.3 * expected[0] + 0.7 * expected[1])
-    assert objective.values(at)[0] == pytest.approx(value)
-    h = 1e-6
-    numeric = [
-        (
-            objective.value_and_gradient(x0 + h * e, np.zeros(3))[0]
-            - objective.value_and_gradient(x0 - h * e, np.zeros(3))[0]
-        )
-        / (2.0 * h)
-        for e in np.eye(3)
-    ]
-    np.testing.assert_allclose(by_x0, numeric, atol=1e-6)
 
 
 @pytest.mark.parametrize(("prior", "best"), [(0.9, ONE), (0.1, TWO)])
