@@ -1,20 +1,18 @@
 """Trials of an evaluation as one file, a row for each attempt, and questions to them."""
 
 import dataclasses
-import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 import lic_drake
 from lic_drake.errors import LibraryError, quoted
 from lic_drake.evaluate.statistics import Count
 from lic_drake.experience.files import readable_errors, write_atomically
+from lic_drake.experience.schema import opened, schema_of, write_table
 
 VERSION = 1
 """Grows with every change of the columns."""
@@ -51,19 +49,7 @@ class TrialRow:
     seconds: float
 
 
-_TYPES: dict[Any, pa.DataType] = {
-    str: pa.string(),
-    int: pa.int64(),
-    float: pa.float64(),
-    bool: pa.bool_(),
-}
-
-SCHEMA = pa.schema(
-    [
-        pa.field(item.name, _TYPES[item.type], nullable=False)
-        for item in dataclasses.fields(TrialRow)
-    ]
-)
+SCHEMA = schema_of(TrialRow)
 """The columns of a file of trials."""
 
 _METADATA = {"lic_drake.trials_version": str(VERSION), "lic_drake.version": lic_drake.__version__}
@@ -77,15 +63,9 @@ def write_trials(path: Path, rows: Sequence[TrialRow]) -> None:
     """
     columns = {name: [getattr(row, name) for row in rows] for name in SCHEMA.names}
     table = pa.Table.from_pydict(columns, schema=SCHEMA.with_metadata(_METADATA))
-    texts = [field.name for field in SCHEMA if field.type == pa.string()]
     with readable_errors(path.parent, "create the folder"):
         path.parent.mkdir(parents=True, exist_ok=True)
-    write_atomically(
-        path,
-        lambda temporary: pq.write_table(
-            table, temporary, compression="zstd", use_dictionary=texts, write_page_checksum=True
-        ),
-    )
+    write_atomically(path, lambda temporary: write_table(table, temporary))
 
 
 def read_trials(path: Path) -> list[TrialRow]:
@@ -94,18 +74,9 @@ def read_trials(path: Path) -> list[TrialRow]:
     Raises:
         LibraryError: The file is missing, damaged, of another kind or of another version.
     """
-    try:
-        with pq.ParquetFile(path, page_checksum_verification=True) as file:
-            _check(path, file.schema_arrow)
-            table = file.read()
-    except (OSError, UnicodeDecodeError, pa.ArrowException) as error:
-        # Damage makes pyarrow raise OSErrors, too, but without an error number.
-        number = getattr(error, "errno", None)
-        if number is not None:
-            raise LibraryError(f"cannot read {path}: {os.strerror(number)}") from None
-        raise LibraryError(
-            f"{path} is damaged or not a Parquet file; delete it and evaluate again"
-        ) from error
+    with opened(path, "delete it and evaluate again") as file:
+        _check(path, file.schema_arrow)
+        table = file.read()
     return [TrialRow(**row) for row in table.to_pylist()]
 
 

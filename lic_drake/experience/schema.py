@@ -7,7 +7,8 @@ itself. Nothing that is read from a file is executed or unpickled.
 
 import dataclasses
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from lic_drake.reach.scenario import Scenario, to_dict
 SCHEMA_VERSION = 4
 """Grows with every change of the columns or the metadata."""
 
-_TYPES = {
+_TYPES: dict[Any, pa.DataType] = {
     str: pa.string(),
     int: pa.int64(),
     float: pa.float64(),
@@ -31,24 +32,24 @@ _TYPES = {
     tuple[float, ...]: pa.list_(pa.field("element", pa.float64(), nullable=False)),
 }
 
-FIELDS: dict[str, Any] = {item.name: item.type for item in dataclasses.fields(ReachRecord)}
-"""Column names and their Python types, in order."""
 
-TUPLES = [name for name, kind in FIELDS.items() if kind == tuple[float, ...]]
-"""Names of the list columns."""
+def schema_of(row: type[Any]) -> pa.Schema:
+    """Returns the columns of a dataclass of rows, with the metadata of its fields."""
+    return pa.schema(
+        [
+            pa.field(
+                item.name,
+                _TYPES[item.type],
+                nullable=False,
+                metadata={key: str(value) for key, value in item.metadata.items()},
+            )
+            for item in dataclasses.fields(row)
+        ]
+    )
 
-SCHEMA = pa.schema(
-    [
-        pa.field(
-            item.name,
-            _TYPES[FIELDS[item.name]],
-            nullable=False,
-            metadata={key: str(value) for key, value in item.metadata.items()},
-        )
-        for item in dataclasses.fields(ReachRecord)
-    ]
-)
-"""The columns, without the metadata that differs by table."""
+
+SCHEMA = schema_of(ReachRecord)
+"""The columns of a library, without the metadata that differs by table."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -86,29 +87,44 @@ def make_header(scenario: Scenario) -> TableHeader:
 
 def to_table(records: Sequence[ReachRecord], header: TableHeader) -> pa.Table:
     """Returns records as a table, one row each, in their order."""
-    columns = {name: [getattr(record, name) for record in records] for name in FIELDS}
-    metadata = {
-        f"lic_drake.{name}": str(value) for name, value in dataclasses.asdict(header).items()
-    }
+    columns = {name: [getattr(record, name) for record in records] for name in SCHEMA.names}
+    metadata = {f"lic_drake.{k}": str(v) for k, v in dataclasses.asdict(header).items()}
     return pa.Table.from_pydict(columns, schema=SCHEMA.with_metadata(metadata))
 
 
 def to_records(table: pa.Table) -> list[ReachRecord]:
     """Returns the rows of a table; every float has the bits that it was written with."""
-    columns = {name: table.column(name).to_pylist() for name in FIELDS}
-    for name in TUPLES:
-        columns[name] = list(map(tuple, columns[name]))
+    lists = [field.name for field in SCHEMA if pa.types.is_list(field.type)]
     return [
-        ReachRecord(**dict(zip(columns, row, strict=True)))
-        for row in zip(*columns.values(), strict=True)
+        ReachRecord(**{**row, **{name: tuple(row[name]) for name in lists}})
+        for row in table.to_pylist()
     ]
 
 
 def write_table(table: pa.Table, path: Path) -> None:
     """Writes a table as a Parquet file with checksums."""
-    texts = [name for name, kind in FIELDS.items() if kind is str]
     # Dictionaries would merge NaNs of different bits, so floats go without.
+    texts = [field.name for field in table.schema if field.type == pa.string()]
     pq.write_table(table, path, compression="zstd", use_dictionary=texts, write_page_checksum=True)
+
+
+@contextmanager
+def opened(path: Path, remedy: str) -> Iterator[pq.ParquetFile]:
+    """Opens a Parquet file; what is wrong with it becomes a `LibraryError`.
+
+    Args:
+        path: The file.
+        remedy: What to do if it is damaged.
+    """
+    try:
+        with pq.ParquetFile(path, page_checksum_verification=True) as file:
+            yield file
+    except (OSError, UnicodeDecodeError, pa.ArrowException) as error:
+        # Damage makes pyarrow raise OSErrors, too, but without an error number.
+        number = getattr(error, "errno", None)
+        if number is not None:
+            raise LibraryError(f"cannot read {path}: {os.strerror(number)}") from None
+        raise LibraryError(f"{path} is damaged or not a Parquet file; {remedy}") from error
 
 
 def read_header(path: Path) -> TableHeader:
@@ -136,25 +152,17 @@ def read_table(path: Path, columns: list[str] | None = None) -> pa.Table:
 
 def _read(path: Path, columns: list[str] | None) -> tuple[TableHeader, pa.Table]:
     """Reads header and columns and checks what can be checked."""
-    try:
-        with pq.ParquetFile(path, page_checksum_verification=True) as file:
-            header = _check_schema(path, file.schema_arrow)
-            table = file.read(columns=list(FIELDS) if columns is None else columns)
-            # Checksums are of pages only: a damaged footer can hide rows.
-            groups = [file.metadata.row_group(i) for i in range(file.num_row_groups)]
-            rows = {file.metadata.num_rows, sum(group.num_rows for group in groups)}
-            if rows != {table.num_rows}:
-                raise pa.ArrowInvalid(f"rows of the parts and of the whole differ: {rows}")
-            return header, table.select(list(FIELDS) if columns is None else columns)
-    except (OSError, UnicodeDecodeError, pa.ArrowException) as error:
-        # Damage makes pyarrow raise OSErrors, too, but without an error number.
-        number = getattr(error, "errno", None)
-        if number is not None:
-            raise LibraryError(f"cannot read {path}: {os.strerror(number)}") from None
-        raise LibraryError(
-            f"{path} is damaged or not a Parquet file; if it belongs to a library, delete it and"
-            " collect its reaches again"
-        ) from error
+    remedy = "if it belongs to a library, delete it and collect its reaches again"
+    wanted = SCHEMA.names if columns is None else columns
+    with opened(path, remedy) as file:
+        header = _check_schema(path, file.schema_arrow)
+        table = file.read(columns=wanted)
+        # Checksums are of pages only: a damaged footer can hide rows.
+        groups = [file.metadata.row_group(i) for i in range(file.num_row_groups)]
+        rows = {file.metadata.num_rows, sum(group.num_rows for group in groups)}
+        if rows != {table.num_rows}:
+            raise pa.ArrowInvalid(f"rows of the parts and of the whole differ: {rows}")
+        return header, table.select(wanted)
 
 
 def _check_schema(path: Path, schema: pa.Schema) -> TableHeader:

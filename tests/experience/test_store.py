@@ -56,11 +56,6 @@ def test_a_single_file_is_a_library_too(library: ExperienceLibrary) -> None:
     assert comparable(single.records()) == comparable(RECORDS[1])
 
 
-def test_writing_a_shard_again_replaces_it(library: ExperienceLibrary) -> None:
-    library.write_shard("training-1", RECORDS[2], SCENARIO)
-    assert comparable(library.records()) == comparable(RECORDS[0] + RECORDS[2])
-
-
 def names(library: ExperienceLibrary) -> list[str]:
     return sorted(path.name for path in library.path.iterdir())
 
@@ -99,30 +94,6 @@ def test_a_kill_between_writing_and_deleting_loses_nothing(
     library.compact()
     assert names(library) == [f"{COMPACTED}.parquet"]
     assert sorted(comparable(library.records())) == sorted(before)
-
-
-def test_compacting_leaves_alone_what_is_one_file_already(library: ExperienceLibrary) -> None:
-    single = ExperienceLibrary(library.path / "training-1.parquet")
-    before = names(library)
-    single.compact()
-    assert names(library) == before
-    library.shard_path("training-0").unlink()
-    library.compact()
-    assert names(library) == ["training-1.parquet"]
-    empty = ExperienceLibrary(library.path / "empty")
-    empty.create()
-    empty.compact()
-    assert names(empty) == []
-
-
-def test_libraries_of_two_scenarios_are_not_made_one(library: ExperienceLibrary) -> None:
-    other = load_scenario("cylinder-clutter", "{stop: {timeout_s: 20}}")
-    rows = [replace(record, scenario=other.digest) for record in RECORDS[2]]
-    library.write_shard("other", rows, other)
-    before = names(library)
-    with pytest.raises(LibraryError, match="hold different scenarios"):
-        library.compact()
-    assert names(library) == before
 
 
 def test_a_library_that_is_not_there_or_empty_says_how_to_make_one(tmp_path: Path) -> None:
@@ -167,12 +138,6 @@ def test_a_folder_without_write_permission_is_one_clear_error(
             os.seteuid(0)
         library.path.chmod(0o755)
     assert sorted(library.path.iterdir()) == before
-
-
-def test_a_path_below_a_file_is_one_clear_error(library: ExperienceLibrary) -> None:
-    below = ExperienceLibrary(library.path / "training-1.parquet" / "library")
-    with pytest.raises(LibraryError, match=r"cannot create the folder .*: Not a directory"):
-        below.write_shard("training-2", RECORDS[2], SCENARIO)
 
 
 def test_merging_keeps_every_reach_once_in_order(
