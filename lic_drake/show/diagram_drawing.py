@@ -6,12 +6,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 from pydrake.systems.framework import Diagram
 
-from lic_drake.errors import LicError
+from lic_drake.show.figures import save_figure
 
 type Edge = tuple[str, str, str, str]
 """A connection: from system, its output port, to system, its input port."""
 
-_WIDTH, _ROW, _GAP = 5.6, 0.3, 2.2
+_WIDTH, _ROW, _GAP = 5.4, 0.36, 2.0
 
 
 def list_connections(diagram: Diagram) -> list[Edge]:
@@ -51,66 +51,50 @@ def draw_diagram(diagram: Diagram, path: Path) -> None:
     """
     edges = list_connections(diagram)
     columns = _columns(edges)
-    figure = Figure(figsize=(4.9 * len(columns), 6.0))
+    figure = Figure(figsize=(3.2 * len(columns), 5.5))
     ax = figure.subplots()
     ax.set_axis_off()
     ports: dict[tuple[str, str, str], tuple[float, float]] = {}
     for i, names in enumerate(columns):
-        y = 0.0
+        x, y = i * (_WIDTH + _GAP), 0.0
         for name in names:
             inputs = sorted({edge[3] for edge in edges if edge[2] == name})
             outputs = sorted({edge[1] for edge in edges if edge[0] == name})
-            height = _ROW * (max(len(inputs), len(outputs)) + 1.5)
-            x = i * (_WIDTH + _GAP)
+            height = _ROW * (len(inputs) + len(outputs) + 1.5)
             box = FancyBboxPatch(
                 (x, y - height), _WIDTH, height, boxstyle="round,pad=0.02", fc="0.96", ec="0.3"
             )
             ax.add_patch(box)
             ax.text(x + 0.5 * _WIDTH, y - 0.1, name, ha="center", va="top", weight="bold")
-            for side, names_of_side, x_port, align, pad in (
-                ("in", inputs, x, "left", 0.06),
-                ("out", outputs, x + _WIDTH, "right", -0.06),
-            ):
-                for row, port in enumerate(names_of_side):
-                    y_port = y - _ROW * (row + 1.6)
-                    ports[side, name, port] = (x_port, y_port)
-                    ax.text(x_port + pad, y_port, port, ha=align, va="center", fontsize=6)
+            sides = [("in", port) for port in inputs] + [("out", port) for port in outputs]
+            for row, (side, port) in enumerate(sides):
+                left, y_port = side == "in", y - _ROW * (row + 1.6)
+                ports[side, name, port] = (x if left else x + _WIDTH, y_port)
+                x_text, align = (x + 0.08, "left") if left else (x + _WIDTH - 0.08, "right")
+                ax.text(x_text, y_port, port, ha=align, va="center", fontsize=8)
             y -= height + 0.5
     for source, output, sink, input_port in edges:
-        backwards = ports["in", sink, input_port][0] < ports["out", source, output][0]
-        ax.annotate(
-            "",
-            xy=ports["in", sink, input_port],
-            xytext=ports["out", source, output],
-            arrowprops={
-                "arrowstyle": "->",
-                "color": "tab:blue",
-                # Wires that run back bend below the boxes, the others hardly.
-                "connectionstyle": "arc3,rad=-0.35" if backwards else "arc3,rad=0.06",
-            },
-        )
+        begin, end = ports["out", source, output], ports["in", sink, input_port]
+        # Wires have a colour for each source; those that run back bend downwards.
+        bend = "arc3,rad=-0.35" if end[0] < begin[0] else "arc3,rad=0.06"
+        color = f"C{[name for column in columns for name in column].index(source)}"
+        arrow = {"arrowstyle": "->", "color": color, "connectionstyle": bend, "alpha": 0.8}
+        ax.annotate("", xy=end, xytext=begin, arrowprops=arrow)
     ax.autoscale_view()
-    try:
-        figure.savefig(path, bbox_inches="tight", dpi=120)
-    except (OSError, ValueError) as error:
-        raise LicError(f"cannot write the drawing {path}: {error}") from None
+    save_figure(figure, path)
 
 
 def _columns(edges: list[Edge]) -> list[list[str]]:
-    """Sorts systems into columns: sources, plant and scene graph, then what they feed.
+    """Sorts systems into columns: sources and scene graph, plant, then what they feed.
 
-    A control loop has no first system; the plant is taken as the one where it begins.
+    The control loop is cut at the plant's inputs.
     """
     names = sorted({name for edge in edges for name in (edge[0], edge[2])})
-    fed = {edge[2] for edge in edges}
+    fed = {edge[2] for edge in edges} - {"scene_graph"}
     depth = {name: int(name in fed) for name in names}
     for _ in names:
         for source, _, sink, _ in edges:
             if sink not in ("plant", "scene_graph"):
-                depth[sink] = max(depth[sink], depth[source] + 1)
-    depth = {name: min(value, len(names)) for name, value in depth.items()}
-    return [
-        column
-        for level in sorted(set(depth.values()))
-        if (column := [name for name in names if depth[name] == level])
-    ]
+                depth[sink] = min(max(depth[sink], depth[source] + 1), len(names))
+    levels = sorted(set(depth.values()))
+    return [[name for name in names if depth[name] == level] for level in levels]

@@ -89,7 +89,7 @@ def test_what_cannot_be_written_is_one_clear_error(
     with pytest.raises(LicError) as caught:
         draw_diagram(diagram, tmp_path / name)
     message = str(caught.value)
-    assert message.startswith(f"cannot write the drawing {tmp_path / name}: ")
+    assert message.startswith(f"cannot write {tmp_path / name}: ")
     assert "\n" not in message
     if name.endswith("docx"):
         assert "png" in message and "svg" in message
