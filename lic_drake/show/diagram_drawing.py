@@ -71,7 +71,7 @@ def draw_diagram(diagram: Diagram, path: Path) -> None:
                 left, y_port = side == "in", y - _ROW * (row + 1.6)
                 ports[side, name, port] = (x if left else x + _WIDTH, y_port)
                 x_text, align = (x + 0.08, "left") if left else (x + _WIDTH - 0.08, "right")
-                ax.text(x_text, y_port, port, ha=align, va="center", fontsize=8)
+                ax.text(x_text, y_port, port, ha=align, va="center", fontsize=7.5)
             y -= height + 0.5
     for source, output, sink, input_port in edges:
         begin, end = ports["out", source, output], ports["in", sink, input_port]
