@@ -5,13 +5,16 @@ import subprocess
 import sys
 import termios
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from support.fake_reach import FakeReach, collect_here, comparable, expected_records, make_request
 
+from lic_drake.cli.collect import LOG_EVERY_S, ProgressDisplay
 from lic_drake.cli.main import main
 from lic_drake.experience.collect import REQUEST_FILE, read_request
+from lic_drake.experience.runner import Progress
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.scenario import load_scenario
 
@@ -188,3 +191,21 @@ def test_a_real_reach_is_collected_with_a_progress_bar_on_a_terminal(tmp_path: P
     assert "reaches/min" in shown
     (record,) = ExperienceLibrary(library).records()
     assert (record.outcome, record.duration_s) == ("timeout", pytest.approx(0.2, abs=0.05))
+
+
+START = Progress(at_work=2, total=100, present=10, done=10, successes=4, elapsed_s=0.0, failed={})
+
+
+def test_a_log_gets_a_line_a_minute(capsys: pytest.CaptureFixture[str]) -> None:
+    with ProgressDisplay() as display:
+        for tick in range(301):
+            elapsed_s = 0.5 * tick
+            display.show(replace(START, done=10 + tick // 10, elapsed_s=elapsed_s))
+    captured = capsys.readouterr()
+    lines = captured.out.splitlines()
+    assert len(lines) == int(150.0 / LOG_EVERY_S)
+    # 12 of 90 reaches in a minute.
+    assert lines[0] == (
+        "22/100 reaches, 4 successes, 12 reaches/min in 2 environments, 0:06 h left"
+    )
+    assert captured.err == ""

@@ -4,12 +4,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.dask_cluster import dask_cluster
 from support.fake_reach import comparable, make_record, make_request
 
 from lic_drake.errors import LibraryError, RequestError
 from lic_drake.evaluate import experiment as dut
 from lic_drake.evaluate.experiment import Evaluation, run_evaluation
 from lic_drake.evaluate.trials import TrialRow, read_trials
+from lic_drake.experience.dask_workers import DaskWorkers
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.experience.workers import LocalWorkers
 from lic_drake.reach.request import ReachRecord, ReachRequest
@@ -241,14 +243,21 @@ def test_apertures_are_evaluated_with_bases(tmp_path: Path, calls: list[str]) ->
     assert {row.method for row in rows} == {"rnd", "cost", "gp"}
 
 
-def test_two_processes_give_the_rows_and_reaches_of_one(tmp_path: Path) -> None:
+def test_processes_and_a_cluster_give_the_rows_and_reaches_of_this_process(
+    tmp_path: Path,
+) -> None:
+    pytest.importorskip("distributed", reason="Dask is missing: pip install 'lic_drake[cluster]'")
     results = []
-    for workers in (1, 2):
-        asked = evaluation(tmp_path, results=tmp_path / str(workers), goals=1)
-        with LocalWorkers(workers) as pool:
-            rows = run_evaluation(asked, pool, quiet)
-        results.append((without_times(rows), comparable(asked.reaches.records())))
-    assert results[0] == results[1]
+    with (
+        LocalWorkers(2) as processes,
+        dask_cluster(workers=1) as dask,
+        DaskWorkers(dask.address) as cluster,
+    ):
+        for i, workers in enumerate((None, processes, cluster)):
+            asked = evaluation(tmp_path, results=tmp_path / str(i), goals=1)
+            rows = run_evaluation(asked, workers, quiet)
+            results.append((without_times(rows), comparable(asked.reaches.records())))
+    assert results[0] == results[1] == results[2]
     assert len(results[0][0]) > 6
     # Simulated ones: none takes longer than it may.
     assert max(record.duration_s for record in asked.reaches.records()) == pytest.approx(0.2)
