@@ -30,7 +30,7 @@ from lic_drake.errors import ScenarioError
 from lic_drake.robots.arm import Arm
 from lic_drake.scene.contact import ContactConfig, object_properties, skin_properties
 from lic_drake.scene.looks import object_color
-from lic_drake.scene.movables import add_floating_body, add_sliding_body
+from lic_drake.scene.movables import add_movable
 from lic_drake.scene.stems import add_stems
 from lic_drake.types import Vector
 
@@ -147,7 +147,16 @@ def add_scene(
     for i in range(instance.num_objects):
         name = f"object{i}"
         if instance.movable[i]:
-            body = _add_movable(plant, clutter, name, instance, i, config)
+            body = add_movable(
+                plant,
+                clutter,
+                name,
+                instance.mass[i],
+                instance.p_WO[i, : instance.num_axes],
+                friction_N=config.ground_friction_N,
+                creep_m_per_s=config.ground_creep_m_per_s,
+                drag_N_s_per_m=config.drag_N_s_per_m,
+            )
             X_BO = RigidTransform(RollPitchYaw(0.0, 0.0, instance.yaw[i]), np.zeros(3))
         else:
             body, X_BO = surroundings, pose_of(instance, i)
@@ -233,23 +242,6 @@ def _add_surroundings(plant: MultibodyPlant) -> RigidBody:
     )
     plant.WeldFrames(plant.world_frame(), body.body_frame())
     return body
-
-
-def _add_movable(
-    plant: MultibodyPlant,
-    clutter: ModelInstanceIndex,
-    name: str,
-    instance: ClutterInstance,
-    i: int,
-    config: SceneConfig,
-) -> RigidBody:
-    """Adds the body of the movable object i."""
-    mass, p_WO = instance.mass[i], instance.p_WO[i]
-    if instance.num_axes == 3:
-        return add_floating_body(plant, clutter, name, mass, p_WO, config.drag_N_s_per_m)
-    return add_sliding_body(
-        plant, clutter, name, mass, p_WO, config.ground_friction_N, config.ground_creep_m_per_s
-    )
 
 
 def pose_of(instance: ClutterInstance, i: int) -> RigidTransform:
