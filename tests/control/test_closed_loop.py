@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from pydrake.systems.analysis import Simulator
 from support.kinematics import only
 from support.reaches import start_context
 from support.worlds import ARM, LAYOUT, cylinder, make_clutter
@@ -39,7 +38,7 @@ def run(
     scenario = parse_scenario(SCENARIO, overrides)
     reach = make_reach_diagram(scenario, clutter)
     context = start_context(reach, q, p_WG)
-    simulator = Simulator(reach.diagram, context)
+    simulator = reach.make_simulator(context)
     samples = []
     for i in range(round(time * scenario.mpc.rate_hz) + 1):
         simulator.AdvanceTo(i * scenario.mpc.period_s)
