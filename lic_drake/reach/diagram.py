@@ -8,8 +8,8 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.control.mpc_controller import HapticMpcController
-from lic_drake.control.surface_taxels import make_taxels
 from lic_drake.control.tactile_sensor import TactileSensor
+from lic_drake.control.taxels import make_taxels
 from lic_drake.reach.scenario import Scenario
 from lic_drake.scene.scene import Scene, SceneConfig, add_scene, make_simulator
 from lic_drake.types import Vector

@@ -8,8 +8,8 @@ import numpy as np
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.control.mpc_controller import HapticMpcController
-from lic_drake.control.surface_taxels import make_taxels
-from lic_drake.control.tactile import ContactPatch, calc_taxel_forces
+from lic_drake.control.tactile_sensor import ContactPatch, calc_taxel_forces
+from lic_drake.control.taxels import make_taxels
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.trace import SceneState
 from lic_drake.types import Vector

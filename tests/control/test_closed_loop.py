@@ -55,11 +55,9 @@ def run(
     )
 
 
-# From the start line into the goal area, from the right, the middle and the left.
+# From the start line into the goal area, from the right and from the left.
 FREE_REACHES = [
     ((0.335, -0.4, 0.0), (0.7, -0.2)),
-    ((0.335, 0.0, 60.0), (0.7, 0.0)),
-    ((0.335, 0.2, 60.0), (0.5, -0.1)),
     ((0.335, 0.3, 90.0), (0.45, 0.35)),
 ]
 
