@@ -90,8 +90,7 @@ class ReachSession:
         if result.trace.p_WO is not None:
             return result.trace.p_WO
         instance = self.environment(request).instance
-        p_WO: Vector = np.array(instance.p_WO[instance.movable, : instance.num_axes])
-        return p_WO
+        return np.array(instance.p_WO[instance.movable, : instance.num_axes])
 
 
 @cache

@@ -180,8 +180,7 @@ def find_free(simulation: Simulated, angles: Vector, p_RG: Vector) -> Vector | N
     for q in angles:
         simulation.begin(q, p_RG)
         if not simulation.is_in_collision():
-            free: Vector = q
-            return free
+            return q
     return None
 
 

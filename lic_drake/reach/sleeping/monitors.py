@@ -61,10 +61,7 @@ class SkinAxes:
         """Returns the ends of the axes, shape (capsules, num_axes, 2): x, y, .. of both, metres."""
         pose = self._arm.calc_pose(q)
         d = self._num_axes
-        ends: Vector = (
-            pose.R_RL[self._link, :d] @ self._p_LA + pose.p_RL[self._link, :d, np.newaxis]
-        )
-        return ends
+        return pose.R_RL[self._link, :d] @ self._p_LA + pose.p_RL[self._link, :d, np.newaxis]
 
     def gaps(self, ends: Vector, p_WO: Vector) -> Vector:
         """Returns the distances from the skin to points, shape (n,), metres.
@@ -77,8 +74,7 @@ class SkinAxes:
         d = p_WO - ends[:, np.newaxis, :, 0]
         share = (d @ along[:, :, np.newaxis])[..., 0] / (along * along).sum(axis=1, keepdims=True)
         d -= np.minimum(np.maximum(share, 0.0), 1.0)[..., np.newaxis] * along[:, np.newaxis]
-        gaps: Vector = (np.sqrt((d * d).sum(axis=2)) - self._radius).min(axis=0)
-        return gaps
+        return (np.sqrt((d * d).sum(axis=2)) - self._radius).min(axis=0)
 
 
 class _Monitor:
