@@ -4,12 +4,14 @@ import weakref
 import numpy as np
 import pytest
 from pydrake.solvers import MathematicalProgram
+from support.select_surfaces import random_model
 
+from lic_drake.estimate.features import features_of
 from lic_drake.reach.scenario import load_scenario
-from lic_drake.reach.starts import make_starts
-from lic_drake.robots.planar import planar_arm
-from lic_drake.select.planar_program import PlanarProgram
-from lic_drake.select.pointing_program import PointingProgram
+from lic_drake.select.objective import Objective
+from lic_drake.select.program import LicProgram
+from lic_drake.select.situation import Situation
+from lic_drake.starts import make_starts
 from lic_drake.weak_method import weakly
 
 
@@ -36,12 +38,16 @@ def test_an_object_dies_unless_its_own_program_holds_its_method(weak: bool) -> N
     assert (reference() is None) == weak
 
 
-def test_programs_of_selections_die_with_the_robot_in_them() -> None:
-    scenario = load_scenario("sphere-aperture-clutter")
+@pytest.mark.parametrize("category", ["cylinder-clutter", "sphere-aperture-clutter"])
+def test_programs_of_selections_die_with_the_robot_in_them(category: str) -> None:
+    scenario = load_scenario(category)
     starts = make_starts(scenario, scenario.sample_instance("evaluation", 0))
-    program = PointingProgram(starts)
-    in_space, robot = weakref.ref(program), weakref.ref(starts.checker)
-    in_plane = weakref.ref(PlanarProgram(planar_arm().kinematics))
-    del starts, program
+    situation = Situation(p_WG=np.zeros(3), starts=starts)
+    features = features_of(category).first
+    program = LicProgram(situation, Objective(model=random_model(0, features), p_WG=np.zeros(3)))
+    references = [weakref.ref(program), weakref.ref(starts)]
+    if starts.checker is not None:
+        references.append(weakref.ref(starts.checker))
+    del starts, situation, program
     gc.collect()
-    assert in_space() is None and robot() is None and in_plane() is None
+    assert all(reference() is None for reference in references)

@@ -6,10 +6,10 @@ import numpy as np
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import RequestError
-from lic_drake.reach.pointing_starts import PointingStarts, pointing_starts
 from lic_drake.reach.request import ReachRequest, check_goal
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.start import Start
+from lic_drake.starts import BoardStarts, board_starts
 from lic_drake.types import Vector
 
 
@@ -58,7 +58,7 @@ def _goal(scenario: Scenario, in_space: bool, args: argparse.Namespace) -> Vecto
 def _through_an_aperture(
     scenario: Scenario, instance: ClutterInstance, p_WG: Vector, args: argparse.Namespace
 ) -> ReachRequest:
-    starts = pointing_starts(scenario, instance, scenario.task.stand)
+    starts = board_starts(scenario, instance, scenario.task.stand)
     y_m = 0.0 if args.base_y is None else args.base_y
     torso_m = scenario.task.torso_m if args.torso is None else args.torso
     _check_stand(starts, y_m, torso_m)
@@ -68,17 +68,17 @@ def _through_an_aperture(
         p_WA = starts.nearest_aperture(*args.aperture)
     b0 = np.array([0.0, y_m, torso_m])
     check_goal(scenario, p_WG - b0)
-    found = starts.pre_select(p_WA, b0)
+    found = starts.at(p_WA, b0)
     if found is None:
         raise RequestError(
             f"from base y {y_m:g} m, torso {torso_m:g} m the arm cannot be in the aperture at y"
             f" {p_WA[1]:.3f} m, z {p_WA[2]:.3f} m; choose another --base-y, --torso or --aperture"
         )
-    start = Start(found[0], b0)
+    start = Start(found.x0, b0)
     return ReachRequest(scenario, args.stream, args.environment, p_WG, start)
 
 
-def _check_stand(starts: PointingStarts, y_m: float, torso_m: float) -> None:
+def _check_stand(starts: BoardStarts, y_m: float, torso_m: float) -> None:
     stand = starts.stand
     for option, value, low, high in (
         ("--base-y", y_m, stand.y_min_m, stand.y_max_m),

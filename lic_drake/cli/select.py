@@ -1,7 +1,8 @@
-"""`lic select`: chooses an initial condition without reaching."""
+"""`lic select`: chooses a start without reaching."""
 
 import argparse
 import json
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lic_drake.cli.arguments import (
@@ -13,19 +14,20 @@ from lic_drake.cli.arguments import (
 )
 
 if TYPE_CHECKING:
-    from lic_drake.reach.scenario import Scenario
-    from lic_drake.reach.starts import Starts
-    from lic_drake.select.situation import FailedReach
+    from lic_drake.select.registry import Selector
+    from lic_drake.select.situation import FailedReach, Selection
+    from lic_drake.starts import FeasibleStarts
 
 
 def add_parser(subparsers: Subparsers) -> None:
     """Adds the subcommand to the command line."""
     parser = subparsers.add_parser(
         "select",
-        help="choose the start pose of a reach",
-        description="Chooses the start pose for a goal from an experience library and prints it"
-        " with its estimated probability of success.",
-        epilog="example: lic select --goal 0.6 0.1 --method gp",
+        help="choose the start of a reach",
+        description="Chooses the start for a goal from an experience library and prints it with its"
+        " estimated probability of success.",
+        epilog="examples: lic select --goal 0.6 0.1 --method gp; lic select --goal 0.6 0.1 --failed"
+        " start_y=0.1 start_phi=0.52 final_x=0.5 final_y=0.05",
     )
     parser.add_argument(
         "--goal",
@@ -38,13 +40,22 @@ def add_parser(subparsers: Subparsers) -> None:
     add_method_argument(parser)
     parser.add_argument(
         "--failed",
-        type=float,
-        nargs=2,
+        nargs="+",
         action="append",
         default=[],
-        metavar=("Y", "DEG"),
-        help="start (metres, degrees) of an attempt that failed, for the PR2 the aperture (Y, Z) in"
-        " metres; may be given several times (default: none)",
+        metavar="NAME=VALUE",
+        help="what an attempt that failed showed, by the names of a record's columns, in metres,"
+        " radians and m/s: start_y, start_phi and for LIC-2 the final pose, for the PR2 start_y and"
+        " start_z of the aperture, base_y and torso; may be given several times (default: none)",
+    )
+    parser.add_argument(
+        "--failed-record",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="the same as a file that `lic reach --json` wrote; may be given several times"
+        " (default: none)",
     )
     add_library_argument(parser)
     parser.add_argument(
@@ -62,9 +73,9 @@ def run(args: argparse.Namespace) -> int:
     from lic_drake.experience.store import ExperienceLibrary
     from lic_drake.paths import shipped_library
     from lic_drake.reach.request import check_goal
-    from lic_drake.reach.starts import make_starts
     from lic_drake.select.registry import make_selector, needs_library
     from lic_drake.select.situation import Situation
+    from lic_drake.starts import make_starts
 
     needs_library(args.method)
     library = ExperienceLibrary(args.library or shipped_library("cylinder-clutter"))
@@ -77,65 +88,150 @@ def run(args: argparse.Namespace) -> int:
         )
     p_WG = np.array([*args.goal, 0.0][:3])
     starts = make_starts(scenario, instance)
-    stands = np.unique(starts.grid.b0, axis=0)
-    nearest = stands[np.argmin(np.linalg.norm((stands - p_WG)[:, 1:], axis=1))]
-    check_goal(scenario, p_WG - nearest)
-    failed = tuple(_failed_start(scenario, starts, *numbers) for numbers in args.failed)
-    situation = Situation(p_WG=p_WG, starts=starts, failed=failed)
+    bases = np.unique(starts.grid.b0, axis=0)
+    check_goal(scenario, p_WG - bases[np.argmin(np.linalg.norm((bases - p_WG)[:, 1:], axis=1))])
+    shown = [_read_values(values) for values in args.failed]
+    shown += [_read_record(path) for path in args.failed_record]
+    failed = tuple(_failed_reach(starts, values) for values in shown)
     rng = np.random.default_rng(args.seed)
     selector = make_selector(args.method, scenario.arm(), library.columns(), rng, scenario.category)
-    chosen = selector.select(situation)
-    x0, b0, q = chosen.start.x0, chosen.start.b0, chosen.start.q
-    assert q is not None
-    if args.json:
-        print(
-            json.dumps(
-                {
-                    "method": chosen.method,
-                    "start": x0.tolist(),
-                    "base": b0[:2].tolist(),
-                    "torso": float(b0[2]),
-                    "joint_angles": q.tolist(),
-                    "estimated_success": chosen.probability,
-                    "seconds": chosen.seconds,
-                }
-            )
-        )
-        return 0
-    estimate = (
-        ""
-        if chosen.probability is None
-        else f", estimated success {100 * chosen.probability:.1f} %"
-    )
-    base = "" if not np.any(starts.grid.b0[:, :2]) else f", base at y {b0[1]:+.3f} m"
-    if instance.num_axes == 2:
-        where = f"start at y {x0[1]:+.3f} m, phi {np.rad2deg(x0[2]):+.1f} degrees"
-    else:
-        where = (
-            f"start in the aperture at y {x0[1]:+.3f} m, z {x0[2]:.3f} m, torso at {b0[2]:.3f} m"
-        )
-    print(
-        f"{chosen.method}: {where}{base}{estimate}; joint angles"
-        f" {np.round(np.rad2deg(q), 1).tolist()} degrees; {chosen.seconds:.2f} s"
-    )
+    for reach in failed:
+        _check_shown(selector, reach)
+    chosen = selector.select(Situation(p_WG=p_WG, starts=starts, failed=failed))
+    print(_to_json(chosen) if args.json else _describe(chosen, starts))
     return 0
 
 
-def _failed_start(scenario: "Scenario", starts: "Starts", y: float, other: float) -> "FailedReach":
-    """Returns a failure that began at y and an angle in degrees, or in the aperture at (y, z).
+def _to_json(chosen: "Selection") -> str:
+    start = chosen.start
+    assert start.q is not None
+    return json.dumps(
+        {
+            "method": chosen.method,
+            "start": start.x0.tolist(),
+            "base": start.b0[:2].tolist(),
+            "torso": float(start.b0[2]),
+            "joint_angles": start.q.tolist(),
+            "estimated_success": chosen.probability,
+            "seconds": chosen.seconds,
+        }
+    )
+
+
+def _describe(chosen: "Selection", starts: "FeasibleStarts") -> str:
+    import numpy as np
+
+    x0, b0, q = chosen.start.x0, chosen.start.b0, chosen.start.q
+    assert q is not None
+    base = f", base at y {b0[1]:+.3f} m" if np.any(starts.grid.b0[:, :2]) else ""
+    if starts.arm.is_planar:
+        where = f"start at y {x0[1]:+.3f} m, phi {np.rad2deg(x0[2]):+.1f} degrees"
+    else:
+        where = f"start in the aperture at y {x0[1]:+.3f} m, z {x0[2]:.3f} m"
+        base = f", torso at {b0[2]:.3f} m{base}"
+    success = chosen.probability
+    estimate = "" if success is None else f", estimated success {100 * success:.1f} %"
+    return (
+        f"{chosen.method}: {where}{base}{estimate}; joint angles"
+        f" {np.round(np.rad2deg(q), 1).tolist()} degrees; {chosen.seconds:.2f} s"
+    )
+
+
+def _read_values(values: list[str]) -> dict[str, float]:
+    """Reads NAME=VALUE.
 
     Raises:
-        RequestError: There is no aperture.
+        RequestError: One is not of that form, or of an unknown name.
+    """
+    from lic_drake.errors import RequestError
+    from lic_drake.experience.pairs import SHOWN
+
+    known = (*SHOWN, "base_x", "base_y", "torso")
+    read = {}
+    for text in values:
+        name, _, value = text.partition("=")
+        try:
+            read[name] = float(value)
+        except ValueError:
+            name = ""
+        if name not in known:
+            raise RequestError(
+                f"--failed needs NAME=VALUE with a number and one of {', '.join(known)}, got"
+                f" {text!r}"
+            )
+    return read
+
+
+def _read_record(path: Path) -> dict[str, float]:
+    """Reads a record that `lic reach --json` wrote.
+
+    Raises:
+        RequestError: The file cannot be read.
+    """
+    from lic_drake.errors import RequestError
+
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+        values = {name: float(x) for name, x in record.items() if isinstance(x, int | float)}
+    except (OSError, ValueError, AttributeError) as error:
+        raise RequestError(
+            f"--failed-record: {path} is no record as `lic reach --json` writes it: {error}"
+        ) from None
+    return values
+
+
+def _failed_reach(starts: "FeasibleStarts", shown: dict[str, float]) -> "FailedReach":
+    """Returns a failed attempt.
+
+    Raises:
+        RequestError: It does not say where it began.
     """
     import numpy as np
 
-    from lic_drake.reach.pointing_starts import PointingStarts
+    from lic_drake.errors import RequestError
     from lic_drake.reach.start import Start
     from lic_drake.select.situation import FailedReach
+    from lic_drake.starts import BoardStarts
 
-    if not isinstance(starts, PointingStarts):
-        x0 = np.array([scenario.task.start_line.x_m, y, np.deg2rad(other)])
-        return FailedReach.from_start(Start(x0))
-    x0 = np.array([*starts.nearest_aperture(y, other), 1.0, 0.0, 0.0, 0.0])
-    b0 = np.array([0.0, 0.0, scenario.task.torso_m])
-    return FailedReach.from_start(Start(x0, b0))
+    on_board = isinstance(starts, BoardStarts)
+    needed = ["start_y", "start_z" if on_board else "start_phi"]
+    varied = np.ptp(starts.grid.b0, axis=0) > 0.0
+    needed += [name for name, v in zip(("base_x", "base_y", "torso"), varied, strict=True) if v]
+    missing = [name for name in needed if name not in shown]
+    if missing:
+        raise RequestError(
+            f"a failed attempt must say where it began: {', '.join(missing)} is missing of"
+            f" {', '.join(needed)}"
+        )
+    b0 = starts.grid.b0[0].copy()
+    for axis, name in enumerate(("base_x", "base_y", "torso")):
+        b0[axis] = shown.get(name, b0[axis])
+    if isinstance(starts, BoardStarts):
+        p_WA = starts.nearest_aperture(shown["start_y"], shown["start_z"])
+        start = starts.at(p_WA, b0) or Start(np.append(p_WA, [1.0, 0.0, 0.0, 0.0]), b0)
+    else:
+        x_m = shown.get("start_x", float(starts.grid.x0[0, 0]))
+        start = Start(np.array([x_m, shown["start_y"], shown["start_phi"]]), b0)
+    return FailedReach(start=start, shown={**FailedReach.from_start(start).shown, **shown})
+
+
+def _check_shown(selector: "Selector", failed: "FailedReach") -> None:
+    """Refuses a failed attempt that does not show all that LIC-2 is to know of it.
+
+    Raises:
+        RequestError: Something is missing.
+    """
+    from lic_drake.errors import RequestError
+    from lic_drake.experience.pairs import FIRST_PREFIX
+    from lic_drake.select.lic import LicSelector
+
+    if not isinstance(selector, LicSelector) or selector.second is None:
+        return
+    needed = [name.removeprefix(FIRST_PREFIX) for name in selector.second.features.observed]
+    missing = [name for name in needed if name not in failed.shown]
+    if missing:
+        raise RequestError(
+            f"{selector.method} chooses a further start by what the failed attempt showed"
+            f" ({', '.join(needed)}), and {', '.join(missing)} is missing; add it to --failed, give"
+            f" --failed-record, or take --method {selector.method}1, which only keeps away from it"
+        )

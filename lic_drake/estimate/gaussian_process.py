@@ -122,7 +122,10 @@ class Posterior:
     def mean(self, X: Vector) -> Vector:
         """Returns the posterior mean for queries X, shape (n, d): shape (n,)."""
         correlation = l1_correlation(self.X, X, self.hyperparameters.theta)
-        return self.prior_mean + self.alpha @ (self.hyperparameters.signal_variance * correlation)
+        mean: Vector = self.prior_mean + self.alpha @ (
+            self.hyperparameters.signal_variance * correlation
+        )
+        return mean
 
     def mean_and_gradient(self, x: Vector) -> tuple[float, Vector]:
         """Returns the posterior mean at x, shape (d,), and its gradient, shape (d,)."""
@@ -163,12 +166,14 @@ def l1_correlation(A: Vector, B: Vector, theta: Vector) -> Vector:
     Returns:
         Shape (n, m).
     """
-    return np.exp(-cdist(A * theta, B * theta, "cityblock"))
+    correlation: Vector = np.exp(-cdist(A * theta, B * theta, "cityblock"))
+    return correlation
 
 
 def coordinate_distances(X: Vector) -> Vector:
     """Returns |x_i - x_j| of each feature, shape (d, n, n)."""
-    return np.abs(X.T[:, :, None] - X.T[:, None, :])
+    distances: Vector = np.abs(X.T[:, :, None] - X.T[:, None, :])
+    return distances
 
 
 def negative_log_likelihood(

@@ -54,7 +54,8 @@ class Neighbourhoods:
 
     def in_scales(self, X: Vector) -> Vector:
         """Returns the situations of rows, shape (..., d), in length scales, shape (..., k)."""
-        return X[..., self.situation] / self.length_scale[self.situation]
+        scaled: Vector = X[..., self.situation] / self.length_scale[self.situation]
+        return scaled
 
     def nearest(self, scaled: Vector, size: int, among: BoolVector | None = None) -> IntVector:
         """Returns the indices of the rows nearest to a situation, shape (size,) or fewer.
@@ -68,7 +69,8 @@ class Neighbourhoods:
         distance = np.sum((self.in_scales(self.X[rows]) - scaled) ** 2, axis=1)
         if len(rows) <= size:
             return rows
-        return rows[np.argpartition(distance, size)[:size]]
+        found: IntVector = rows[np.argpartition(distance, size)[:size]]
+        return found
 
 
 class LocalEstimator(SuccessEstimator):
@@ -141,7 +143,8 @@ class LocalEstimator(SuccessEstimator):
 
     def _cell(self, X: Vector) -> Vector:
         """Returns the centres of the queries' cells, shape (..., k), in length scales."""
-        return _CELL * np.round(self._near.in_scales(X) / _CELL) + 0.0
+        centres: Vector = _CELL * np.round(self._near.in_scales(X) / _CELL) + 0.0
+        return centres
 
     def _cells_of(self, X: Vector) -> Iterator[tuple[Vector, IntVector]]:
         """Yields each cell that holds any queries, with their indices."""

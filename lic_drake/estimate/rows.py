@@ -161,7 +161,8 @@ def group_folds(groups: ArrayLike, max_folds: int) -> IntVector:
         )
     # Shuffled, lest the order of a grid decide which rows share a fold.
     rank = make_generator("training", "folds").permutation(len(distinct))
-    return rank[index] % min(max_folds, len(distinct))
+    fold: IntVector = rank[index] % min(max_folds, len(distinct))
+    return fold
 
 
 def selection_folds(groups: ArrayLike | None, num_rows: int, max_folds: int = 5) -> IntVector:

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from lic_drake.reach.request import ReachRecord, ReachRequest
+from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario
-from lic_drake.reach.session import run_reach
-from lic_drake.reach.starts import Starts, make_starts
 from lic_drake.seeds import make_generator
 from lic_drake.select.registry import Selector
 from lic_drake.select.situation import FailedReach, Selection, Situation
+from lic_drake.starts import FeasibleStarts, make_starts
 from lic_drake.types import Vector
 
 
@@ -35,7 +35,7 @@ def run_trial(
     fresh: bool = False,
     moves: bool = True,
     reach: Callable[[ReachRequest], ReachRecord] = run_reach,
-    look: Callable[[int], tuple[Vector, Starts]] | None = None,
+    look: Callable[[int], tuple[Vector, FeasibleStarts]] | None = None,
 ) -> list[Attempt]:
     """Selects and reaches until the goal is reached or the attempts are used up.
 
@@ -55,8 +55,8 @@ def run_trial(
             finds the environment as it was drawn.
     """
     if look is None:
-        starts = make_starts(scenario, scenario.sample_instance(stream, environment), moves)
-        look = _knowing(p_WG, starts)
+        known = make_starts(scenario, scenario.sample_instance(stream, environment), moves)
+        look = _knowing(p_WG, known)
     done: list[Attempt] = []
     for number in range(attempts):
         p_seen, starts = look(number)
@@ -72,7 +72,9 @@ def run_trial(
     return done
 
 
-def _knowing(p_WG: Vector, starts: Starts) -> Callable[[int], tuple[Vector, Starts]]:
+def _knowing(
+    p_WG: Vector, starts: FeasibleStarts
+) -> Callable[[int], tuple[Vector, FeasibleStarts]]:
     return lambda _: (p_WG, starts)
 
 
@@ -89,7 +91,8 @@ def random_requests(
     """
     requests = []
     for environment in range(environments):
-        starts = make_starts(scenario, scenario.sample_instance(stream, environment)).grid
+        instance = scenario.sample_instance(stream, environment)
+        starts = make_starts(scenario, instance).grid.without_q()
         for goal in range(goals):
             index = 0 if scenario.task.goal_area is None else goal
             p_WG = scenario.sample_goal(stream, environment, index)

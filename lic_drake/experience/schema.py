@@ -71,7 +71,8 @@ class TableHeader:
 
 def scenario_text(scenario: Scenario) -> str:
     """Returns every value of a scenario as YAML; `parse_scenario` reads it back."""
-    return yaml.safe_dump(to_dict(scenario), sort_keys=False)
+    text: str = yaml.safe_dump(to_dict(scenario), sort_keys=False)
+    return text
 
 
 def make_header(scenario: Scenario) -> TableHeader:

@@ -11,11 +11,10 @@ from lic_drake.errors import PerceptionError, ScenarioError
 from lic_drake.perception.board_grid import BoardModel
 from lic_drake.perception.camera_station import CameraStation, Look
 from lic_drake.perception.config import CamerasConfig
-from lic_drake.reach.pointing_starts import PointingStarts, pointing_starts
 from lic_drake.reach.request import ReachRecord
 from lic_drake.reach.scenario import Scenario
-from lic_drake.reach.starts import Starts
 from lic_drake.seeds import make_generator
+from lic_drake.starts import BoardStarts, FeasibleStarts, board_starts
 from lic_drake.types import Vector
 
 LEAST_PROBABILITY = 0.5
@@ -35,7 +34,7 @@ class Belief:
 
     look: Look
     p_WG: Vector
-    starts: PointingStarts
+    starts: BoardStarts
     index: NDArray[np.intp]
 
     def over_all(self, values: Vector) -> Vector:
@@ -67,7 +66,7 @@ class Observer:
     _station: CameraStation | None = field(default=None, init=False, repr=False)
     _beliefs: dict[int, Belief] = field(default_factory=dict, init=False, repr=False)
 
-    def __call__(self, number: int) -> tuple[Vector, Starts]:
+    def __call__(self, number: int) -> tuple[Vector, FeasibleStarts]:
         """Returns the believed p_WG, shape (3,), metres, and starts before an attempt, from 0."""
         belief = self.belief(number)
         return belief.p_WG, belief.starts
@@ -140,7 +139,7 @@ def estimate_board(scenario: Scenario, look: Look, moves: bool = True) -> Belief
     believed = replace(scenario, clutter=seen)  # type: ignore[arg-type]
     stand = believed.task.stand if moves else None
     covered = np.delete(np.arange(len(found.p_WA)), index)
-    starts = pointing_starts(believed, seen.blocked_board(covered), stand)
+    starts = board_starts(believed, seen.blocked_board(covered), stand)
     return Belief(
         look=look,
         p_WG=look.goal.p_WG,

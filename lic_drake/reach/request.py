@@ -171,7 +171,8 @@ def _read_after(record: "ReachRecord", angles: int) -> list[tuple[Start, ...]]:
 
 def _in_space(unit: str, doc: str) -> float:
     """Returns a column that is 0 in the plane."""
-    return field(default=0.0, metadata={"unit": unit, "doc": doc})
+    column: float = field(default=0.0, metadata={"unit": unit, "doc": doc})
+    return column
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -299,7 +300,7 @@ def check_goal(scenario: Scenario, p_RG: Vector) -> None:
 
 
 def is_within_reach(scenario: Scenario, p_RG: Vector) -> bool:
-    """Returns whether the straight arm could come near enough to a goal to succeed.
+    """Tells whether the straight arm could come near enough to a goal to succeed.
 
     Args:
         scenario: Robot and success distance.

@@ -62,7 +62,8 @@ class Start:
     @property
     def x0_R(self) -> Vector:
         """The hand pose in R, the frame that moves with b0; shape as x0."""
-        return _shifted(self.x0[None], self.b0[None])[0]
+        x0_R: Vector = _shifted(self.x0[None], self.b0[None])[0]
+        return x0_R
 
     def __eq__(self, other: object) -> bool:
         """Returns whether another start has the same numbers."""
@@ -84,7 +85,8 @@ class Starts:
     Attributes:
         x0: Hand poses in W, shape (n, 3) or (n, 7).
         b0: Bases and torsos, shape (n, 3), metres.
-        q: Joint angles, shape (n, m), radians; None where they are left to the arm.
+        q: Joint angles, shape (n, m), radians, rows of NaN where they are left to the arm; None if
+            they are all.
     """
 
     x0: Vector
@@ -101,7 +103,8 @@ class Starts:
 
     def __getitem__(self, index: int) -> Start:
         """Returns one of them."""
-        return Start(self.x0[index], self.b0[index], None if self.q is None else self.q[index])
+        q = None if self.q is None or np.isnan(self.q[index, 0]) else self.q[index]
+        return Start(self.x0[index], self.b0[index], q)
 
     def __iter__(self) -> Iterator[Start]:
         """Yields them one by one."""
@@ -116,22 +119,21 @@ class Starts:
         """Returns some of them, by a mask or by indices."""
         return Starts(self.x0[which], self.b0[which], None if self.q is None else self.q[which])
 
+    def without_q(self) -> "Starts":
+        """Returns them with the joint angles left to the arm."""
+        return Starts(self.x0, self.b0)
+
     def join(self, other: "Starts") -> "Starts":
-        """Returns these followed by others; with joint angles if both have them."""
-        q = None if self.q is None or other.q is None else np.vstack([self.q, other.q])
-        return Starts(np.vstack([self.x0, other.x0]), np.vstack([self.b0, other.b0]), q)
+        """Returns these followed by others."""
+        m = max(0 if some.q is None else some.q.shape[1] for some in (self, other))
+        return Starts(
+            np.vstack([self.x0, other.x0]),
+            np.vstack([self.b0, other.b0]),
+            np.vstack([self._angles(m), other._angles(m)]) if m else None,
+        )
 
-    # Names of before, until all callers use b0.
-
-    @property
-    def p_WR(self) -> Vector:
-        """Positions of the base in the plane, shape (n, 2), metres."""
-        return self.b0[:, :2]
-
-    @property
-    def torso_m(self) -> Vector:
-        """Heights of the torso, shape (n,), metres."""
-        return self.b0[:, 2]
+    def _angles(self, m: int) -> Vector:
+        return np.full((len(self), m), np.nan) if self.q is None else self.q
 
 
 def _shifted(x0: Vector, b0: Vector) -> Vector:

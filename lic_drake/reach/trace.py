@@ -99,7 +99,8 @@ class ReachTrace:
         span = times[last] - times[first]
         if span <= 0.0:
             return np.zeros(3)
-        return (self.p_WE[last] - self.p_WE[first]) / span
+        velocity: Vector = (self.p_WE[last] - self.p_WE[first]) / span
+        return velocity
 
 
 class ReachResult(NamedTuple):

@@ -1,32 +1,41 @@
 """RND and COST, the strategies that the paper compares LIC with (VI-A)."""
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from lic_drake.errors import RequestError
-from lic_drake.reach.pointing_starts import PointingStarts
-from lic_drake.reach.start import IN_PLANE, Start, Starts
+from lic_drake.reach.start import IN_PLANE, IN_SPACE
+from lic_drake.robots.arm import Arm
 from lic_drake.select.situation import Selection, Situation
 from lic_drake.types import Vector
 
-HAND_LENGTH_M = 0.288
-"""Length of the last link with the tip, metres."""
-HAND_RADIUS_M = 0.015
-"""Radius of its skin, metres."""
-OBJECT_RADIUS_M = 0.01
-"""Radius of a cylinder, metres."""
-
-PR2_HAND_LENGTH_M = 0.18
-"""From the PR2's wrist to its tool, metres."""
-PR2_HAND_RADIUS_M = 0.06
-"""Radius of its gripper, metres."""
-SPHERE_RADIUS_M = 0.05
-"""Radius of the floating spheres, metres."""
+OBJECT_RADIUS_M = {IN_PLANE: 0.01, IN_SPACE: 0.05}
+"""Radius of an object of the clutter, metres: cylinders in the plane, spheres in space."""
 
 
-def corridor_cost(x0: Vector, p_WG: Vector) -> Vector:
+class Hand(NamedTuple):
+    """The last link, which comes first on the way to a goal.
+
+    Attributes:
+        length_m: Distance of the tip from the last joint, metres.
+        radius_m: Largest radius of its shapes, metres.
+    """
+
+    length_m: float
+    radius_m: float
+
+    @classmethod
+    def of(cls, arm: Arm) -> Self:
+        """Returns the hand of an arm."""
+        last, tip = arm.kinematics.arm.p_RJ[-2:]
+        shapes = [s.enclosing_capsule() for s in arm.skin if s.link == arm.link_names[-1]]
+        return cls(float(np.linalg.norm(tip - last)), max(shape.size[0] for shape in shapes))
+
+
+def corridor_cost(x0: Vector, p_WG: Vector, hand: Hand) -> Vector:
     """Returns what the last link sweeps on the straight way to the goal, shape (n,).
 
     Divided by the clutter's density it is the expected number of contacts, the paper's
@@ -39,6 +48,7 @@ def corridor_cost(x0: Vector, p_WG: Vector) -> Vector:
     Args:
         x0: Start poses, (x, y, phi), shape (n, 3), or position and quaternion, shape (n, 7).
         p_WG: Goal, shape (3,), metres.
+        hand: The last link.
 
     Returns:
         Cost, shape (n,), square metres, in space cubic metres.
@@ -48,19 +58,17 @@ def corridor_cost(x0: Vector, p_WG: Vector) -> Vector:
     way = p_WG[position] - x0[:, position]
     distance = np.linalg.norm(way, axis=1)
     if in_plane:
-        hand = np.column_stack([np.cos(x0[:, 2]), np.sin(x0[:, 2])])
+        direction = np.column_stack([np.cos(x0[:, 2]), np.sin(x0[:, 2])])
     else:
         w, x, y, z = x0[:, 3:].T
-        hand = np.column_stack(
+        direction = np.column_stack(
             [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)]
         )
-    cos_delta = np.sum(way * hand, axis=1) / np.maximum(distance, 1e-12)
+    cos_delta = np.sum(way * direction, axis=1) / np.maximum(distance, 1e-12)
     sin_delta = np.sqrt(np.maximum(0.0, 1.0 - cos_delta**2))
-    aside = np.where(cos_delta >= 0.0, sin_delta, 1.0)
-    if in_plane:
-        return distance * (2.0 * (HAND_RADIUS_M + OBJECT_RADIUS_M) + HAND_LENGTH_M * aside)
-    r = PR2_HAND_RADIUS_M + SPHERE_RADIUS_M
-    return distance * (np.pi * r**2 + 2.0 * r * PR2_HAND_LENGTH_M * aside)
+    aside = hand.length_m * np.where(cos_delta >= 0.0, sin_delta, 1.0)
+    r = hand.radius_m + OBJECT_RADIUS_M[x0.shape[1]]
+    return distance * (2.0 * r + aside if in_plane else np.pi * r**2 + 2.0 * r * aside)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,13 +83,19 @@ class RandomSelector:
     method: str = "rnd"
 
     def select(self, situation: Situation) -> Selection:
-        """Draws a start."""
+        """Draws a start.
+
+        Raises:
+            RequestError: All have failed.
+        """
         began = time.perf_counter()
         choices = situation.starts.grid.take(situation.untried(situation.starts.grid))
         if len(choices) == 0:
             raise RequestError("all discrete starts have failed; no start is left to draw")
-        i = int(self.rng.integers(len(choices)))
-        return make_selection(situation, choices, i, None, self.method, began)
+        start = choices[int(self.rng.integers(len(choices)))]
+        return Selection(
+            start=start, probability=None, method=self.method, seconds=time.perf_counter() - began
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,65 +106,28 @@ class CostSelector:
     whose shoulder is nearest to the goal across x, where most of the arm's length is left for the
     way in. A PR2 moves as little as it can: with its shoulder before the goal the forearm jams in
     the aperture, and COST came to 9 % of the goals instead of 31 %.
-
-    Attributes:
-        p_RS: The shoulder about which the arm turns, shape (3,), metres.
-        stays: Whether base and torso move as little as they can.
     """
 
-    p_RS: Vector = field(default_factory=lambda: np.zeros(3))
-    stays: bool = False
     method: str = "cost"
 
     def select(self, situation: Situation) -> Selection:
-        """Returns the best start."""
+        """Returns the best start.
+
+        Raises:
+            RequestError: None is left.
+        """
         began = time.perf_counter()
-        choices = situation.starts.grid.take(situation.allowed(situation.starts.grid))
+        starts = situation.starts
+        choices = starts.grid.take(situation.allowed(starts.grid))
         if len(choices) == 0:
             raise RequestError("no discrete start is left away from the failed ones")
-        cost = corridor_cost(choices.x0, situation.p_WG)
-        if not self.stays:
-            second = np.abs((choices.b0 + self.p_RS - situation.p_WG)[:, 1])
+        cost = corridor_cost(choices.x0, situation.p_WG, Hand.of(starts.arm))
+        if starts.home is None:
+            second = np.abs((choices.b0 + starts.arm.p_RS - situation.p_WG)[:, 1])
         else:
-            assert isinstance(situation.starts, PointingStarts)
-            torso_m = situation.starts.scenario.task.torso_m
-            second = np.linalg.norm(choices.b0 - [0.0, 0.0, torso_m], axis=1)
+            second = np.linalg.norm(choices.b0 - starts.home, axis=1)
         # Rounded: equal poses have equal costs but for the last digits.
-        i = int(np.lexsort([second, np.round(cost, 9)])[0])
-        return make_selection(situation, choices, i, None, self.method, began)
-
-
-def make_selection(
-    situation: Situation,
-    conditions: Starts,
-    index: int,
-    probability: float | None,
-    method: str,
-    began: float,
-) -> Selection:
-    """Returns a selection after checking it with the closed-form inverse kinematics.
-
-    Args:
-        situation: What was asked.
-        conditions: Initial conditions.
-        index: Which of them was chosen.
-        probability: Its estimated probability of success, if there is an estimate.
-        method: Name of the strategy.
-        began: `time.perf_counter()` at the beginning of the selection.
-
-    Raises:
-        RequestError: The arm cannot start there.
-    """
-    x0, b0 = conditions.x0[index], conditions.b0[index]
-    q = situation.starts.angles(x0, b0[:2], float(b0[2]))
-    if q is None:
-        raise RequestError(
-            f"the arm cannot start at {np.round(x0, 4).tolist()} from a base at"
-            f" {np.round(b0[:2], 4).tolist()} with the torso at {b0[2]:.4f} m"
+        start = choices[int(np.lexsort([second, np.round(cost, 9)])[0])]
+        return Selection(
+            start=start, probability=None, method=self.method, seconds=time.perf_counter() - began
         )
-    return Selection(
-        start=Start(x0, b0, q),
-        probability=probability,
-        method=method,
-        seconds=time.perf_counter() - began,
-    )

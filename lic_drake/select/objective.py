@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from lic_drake.estimate.features import FeatureMap
-from lic_drake.reach.start import Starts
+from lic_drake.reach.start import Start, Starts
 from lic_drake.select.situation import FailedReach
 from lic_drake.types import Vector
 
@@ -82,8 +82,7 @@ class Objective:
             b0: Place of the base and height of the torso, shape (3,), metres.
         """
         features = self.model.features
-        x0_R = x0.copy()
-        x0_R[:3] -= b0
+        x0_R = Start(x0, b0).x0_R
         observed: list[Vector | None] = [None]
         if self.failed:
             observed = [features.observation(failed.shown, b0) for failed in self.failed]

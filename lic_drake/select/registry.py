@@ -13,9 +13,8 @@ from lic_drake.estimate.registry import estimator_names, make_estimator
 from lic_drake.experience.pairs import pair_reaches
 from lic_drake.robots.arm import Arm
 from lic_drake.select.baselines import CostSelector, RandomSelector
+from lic_drake.select.lic import LicSelector
 from lic_drake.select.objective import SuccessModel
-from lic_drake.select.planar_lic import PlanarLic
-from lic_drake.select.pointing_lic import PointingLic
 from lic_drake.select.situation import Selection, Situation
 
 
@@ -120,7 +119,7 @@ def make_selector(
         rng = np.random.default_rng(0) if rng is None else rng
         if method == "rnd":
             return RandomSelector(rng=rng)
-        return CostSelector(p_RS=arm.p_RS, stays=not arm.is_planar)
+        return CostSelector()
     if columns is None:
         raise RequestError(f"method {method!r} needs an experience library to learn from")
     features, only_first = features_of(category), method not in estimator_names()
@@ -134,9 +133,7 @@ def make_selector(
         pairs = pair_reaches(columns) if pairs is None else pairs
         second = fit_model(estimator, features.second, pairs)
     first_model = fit_model(estimator, features.first, columns)
-    if arm.is_planar:
-        return PlanarLic(arm, first_model, second, method=method)
-    return PointingLic(first_model, second, method=method)
+    return LicSelector(first_model, second, method=method)
 
 
 def fit_model(

@@ -6,15 +6,13 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lic_drake.errors import RequestError
 from lic_drake.experience.pairs import SHOWN
 from lic_drake.reach.request import ReachRecord
-from lic_drake.reach.start import IN_PLANE, POSE_AXES, Start
-from lic_drake.reach.start import Starts as StartBatch
-from lic_drake.reach.starts import ApertureStarts, LineStarts, Region, Starts
-from lic_drake.types import Vector
+from lic_drake.reach.start import IN_PLANE, POSE_AXES, Start, Starts
+from lic_drake.starts import FeasibleStarts, Region
+from lic_drake.types import BoolVector, Vector
 
 RETRY_DISTANCES_M = (0.1, 0.05, 0.025, 0.0, -1.0)
 """A further attempt starts more than the first of these from all failed ones across x: the "local
@@ -52,16 +50,16 @@ class FailedReach:
 
 @dataclass(frozen=True, kw_only=True)
 class Situation:
-    """The goal, the possible starts, and the attempts at the goal that failed.
+    """The goal, the feasible starts, and the attempts at the goal that failed.
 
     Attributes:
         p_WG: Goal, shape (3,), metres.
-        starts: The possible initial conditions.
+        starts: The feasible starts.
         failed: Failed attempts in this environment, in their order.
     """
 
     p_WG: Vector
-    starts: Starts
+    starts: FeasibleStarts
     failed: tuple[FailedReach, ...] = ()
 
     def __post_init__(self) -> None:
@@ -76,56 +74,41 @@ class Situation:
             RETRY_DISTANCES_M[-1],
         )
 
-    def allowed(self, conditions: StartBatch) -> NDArray[np.bool_]:
-        """Tells which of n initial conditions are far enough from all failed ones, shape (n,).
+    def allowed(self, some: Starts) -> BoolVector:
+        """Returns which of n starts are far enough from all failed ones, shape (n,).
 
         None of them is one that failed.
         """
-        return self._away(conditions, self.retry_distance_m)
+        return self._away(some, self.retry_distance_m)
 
-    def untried(self, conditions: StartBatch) -> NDArray[np.bool_]:
-        """Tells which of n initial conditions have not failed themselves, shape (n,)."""
-        return self._away(conditions, RETRY_DISTANCES_M[-1])
-
-    def _away(self, conditions: StartBatch, distance_m: float) -> NDArray[np.bool_]:
-        away = np.ones(len(conditions), dtype=bool)
-        for failed in (reach.start for reach in self.failed):
-            same_pose = np.all(np.isclose(conditions.x0, failed.x0), axis=1)
-            away &= ~(same_pose & np.all(np.isclose(conditions.b0, failed.b0), axis=1))
-            across = slice(1, 2 if len(failed.x0) == IN_PLANE else 3)
-            apart = np.linalg.norm(conditions.x0[:, across] - failed.x0[across], axis=1)
-            away &= apart > distance_m + 1e-9
-        return away
-
-    @property
-    def planar_starts(self) -> LineStarts | ApertureStarts:
-        """The starts of a planar arm.
-
-        Raises:
-            RequestError: The robot reaches in space.
-        """
-        if not isinstance(self.starts, LineStarts | ApertureStarts):
-            raise RequestError("this needs the start line of a planar arm; the robot has another")
-        return self.starts
+    def untried(self, some: Starts) -> BoolVector:
+        """Returns which of n starts have not failed themselves, shape (n,)."""
+        return self._away(some, RETRY_DISTANCES_M[-1])
 
     def free_regions(self) -> tuple[Region, ...]:
-        """Returns the parts of a planar arm's regions that are away from all failed attempts."""
-        regions = self.planar_starts.regions
-        if self.retry_distance_m < 0.0:
-            return regions
+        """Returns the parts of the regions that are away from all failed attempts."""
+        if self.retry_distance_m < 0.0 or not self.failed:
+            return self.starts.regions
+        failed = [reach.start for reach in self.failed]
         margin = self.retry_distance_m + 1e-6
-        for failed in self.failed:
-            y = failed.start.x0[1]
-            cut = []
-            for region in regions:
-                cut += [_clip(region, upper=y - margin), _clip(region, lower=y + margin)]
-            regions = tuple(region for region in cut if region.lower[1] <= region.upper[1])
-        return regions
+        return tuple(
+            part for region in self.starts.regions for part in region.away_from(failed, margin)
+        )
+
+    def _away(self, some: Starts, distance_m: float) -> BoolVector:
+        away = np.ones(len(some), dtype=bool)
+        for failed in (reach.start for reach in self.failed):
+            same_pose = np.all(np.isclose(some.x0, failed.x0), axis=1)
+            away &= ~(same_pose & np.all(np.isclose(some.b0, failed.b0), axis=1))
+            across = slice(1, 2 if len(failed.x0) == IN_PLANE else 3)
+            apart = np.linalg.norm(some.x0[:, across] - failed.x0[across], axis=1)
+            away &= apart > distance_m + 1e-9
+        return away
 
 
 @dataclass(frozen=True, kw_only=True)
 class Selection:
-    """A chosen initial condition.
+    """A chosen start.
 
     Attributes:
         start: Hand pose, base and torso, and the joint angles to begin with.
@@ -138,10 +121,3 @@ class Selection:
     probability: float | None
     method: str
     seconds: float
-
-
-def _clip(region: Region, lower: float = -np.inf, upper: float = np.inf) -> Region:
-    """Returns a region without what lies outside a range of y."""
-    low, high = region.lower.copy(), region.upper.copy()
-    low[1], high[1] = max(low[1], lower), min(high[1], upper)
-    return Region(lower=low, upper=high, base_lower=region.base_lower, base_upper=region.base_upper)

@@ -8,15 +8,15 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
 from lic_drake.evaluate.trial import Attempt
-from lic_drake.reach.pointing_starts import PointingStarts
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.objective import SuccessObjective
 from lic_drake.show.figures import estimate_title, situations
+from lic_drake.starts import BoardStarts
 from lic_drake.types import Vector
 
 
 def apertures_figure(
-    selector: LicSelector, starts: PointingStarts, attempts: Sequence[Attempt]
+    selector: LicSelector, starts: BoardStarts, attempts: Sequence[Attempt]
 ) -> Figure:
     """Returns a map before each attempt.
 
@@ -36,7 +36,7 @@ def apertures_figure(
     return figure
 
 
-def estimate_apertures(objective: SuccessObjective, starts: PointingStarts) -> Vector:
+def estimate_apertures(objective: SuccessObjective, starts: BoardStarts) -> Vector:
     """Returns the highest estimate over base and torso at each open aperture, shape (k,).
 
     It includes the probability that the aperture is open. NaN where there is no feasible start.
@@ -56,7 +56,7 @@ def estimate_apertures(objective: SuccessObjective, starts: PointingStarts) -> V
 
 def draw_aperture_map(
     ax: Axes,
-    starts: PointingStarts,
+    starts: BoardStarts,
     probability: Vector,
     p_WG: Vector,
     chosen: Sequence[tuple[str, Vector]] = (),
@@ -70,10 +70,10 @@ def draw_aperture_map(
         p_WG: Goal, shape (3,), metres.
         chosen: Labels and centres of apertures that were chosen.
     """
-    image, edge = None, starts.aperture_m
+    image, edge = None, starts.board.aperture_m
     half = 0.5 * edge
     highest = max(0.01, float(np.nanmax(probability, initial=0.0)))
-    for p in starts.all_apertures:
+    for p in starts.board.aperture_centres():
         y, z = p[1:]
         is_here = np.all(np.isclose(starts.p_WA, p), axis=1)
         if not np.any(is_here):

@@ -15,17 +15,16 @@ from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.perception.cameras import make_renderer
 from lic_drake.perception.config import CamerasConfig
 from lic_drake.perception.observer import Observer
-from lic_drake.reach.record import make_record
 from lic_drake.reach.request import ReachRecord, ReachRequest
+from lic_drake.reach.rollout import make_record, simulate_request
 from lic_drake.reach.scenario import Scenario
-from lic_drake.reach.session import simulate_request
-from lic_drake.reach.starts import Starts, make_starts
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.registry import Selector, make_selector, needs_library
 from lic_drake.select.situation import Selection, Situation
 from lic_drake.show.figures import ShownTrial, describe_start, is_reachable
 from lic_drake.show.pictures import remove_pictures, save_pictures
+from lic_drake.starts import FeasibleStarts, make_starts
 from lic_drake.types import Vector
 
 STREAM = "evaluation"
@@ -105,7 +104,7 @@ def demonstrate(
     known = make_starts(scenario, instance)
     traces: list[ReachTrace] = []
 
-    def look(number: int) -> tuple[Vector, Starts]:
+    def look(number: int) -> tuple[Vector, FeasibleStarts]:
         if observer is None:
             return p_WG, known
         belief = observer.belief(number)

@@ -8,11 +8,10 @@ from matplotlib.figure import Figure
 
 from lic_drake.evaluate.trial import Attempt
 from lic_drake.reach.start import Start, Starts
-from lic_drake.reach.starts import PlanarStarts, Region, find_region
-from lic_drake.reach.starts import Starts as FeasibleStarts
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.situation import Situation
 from lic_drake.show.figures import ATTEMPT_COLORS, estimate_title, situations
+from lic_drake.starts import LineStarts, Region, find_regions
 from lic_drake.types import Vector
 
 DENSITY_SHAPE = (81, 91)
@@ -20,7 +19,7 @@ DENSITY_SHAPE = (81, 91)
 
 
 def densities_figure(
-    selector: LicSelector, starts: FeasibleStarts, attempts: Sequence[Attempt]
+    selector: LicSelector, starts: LineStarts, attempts: Sequence[Attempt]
 ) -> Figure:
     """Returns the estimates over all starts before each attempt.
 
@@ -34,15 +33,15 @@ def densities_figure(
     before = situations(attempts, [starts] * len(attempts))
     for ax, (number, attempt, situation) in zip(axes, before, strict=True):
         chosen = attempt.request.start
-        region = find_region(situation.planar_starts.regions, chosen.x0, chosen.b0[:2])
-        assert region is not None  # Selections lie in one.
-        lattice = density_lattice(situation.planar_starts, region)
+        # Selections lie in one.
+        region = starts.regions[find_regions(starts.regions, Starts.of(chosen))[0]]
+        lattice = density_lattice(starts, region)
         draw_density(ax, lattice, estimate_density(selector, situation, lattice), chosen, number)
         ax.set_title(estimate_title(selector, number, attempt), fontsize=10)
     return figure
 
 
-def density_lattice(starts: PlanarStarts, region: Region) -> Starts:
+def density_lattice(starts: LineStarts, region: Region) -> Starts:
     """Returns a lattice of starts over a start line, feasible or not; phi varies fastest.
 
     Where the base moves, the hand is in the centre of an aperture and the base varies; relative to
@@ -52,7 +51,7 @@ def density_lattice(starts: PlanarStarts, region: Region) -> Starts:
         starts: The feasible starts.
         region: One of their regions: the line, or an aperture.
     """
-    line = starts.poses.line
+    line = starts.line
     y = np.linspace(line.lower[1], line.upper[1], DENSITY_SHAPE[0])
     phi = np.linspace(line.lower[2], line.upper[2], DENSITY_SHAPE[1])
     poses = np.array([[line.x_m, yi, phi_i] for yi in y for phi_i in phi])
@@ -64,7 +63,7 @@ def density_lattice(starts: PlanarStarts, region: Region) -> Starts:
 
 def estimate_density(selector: LicSelector, situation: Situation, lattice: Starts) -> Vector:
     """Returns the estimates at n starts, shape (n,), NaN where the arm cannot start."""
-    arm = situation.planar_starts.poses.arm
+    arm = situation.starts.arm
     feasible = np.array([len(arm.solve_ik(x0)) > 0 for x0 in lattice.in_R])
     density = np.full(len(feasible), np.nan)
     values = selector.objective(situation).values(lattice.take(feasible))

@@ -13,10 +13,10 @@ from lic_drake.evaluate.trial import Attempt
 from lic_drake.reach.request import is_within_reach
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.start import IN_PLANE, Start
-from lic_drake.reach.starts import Starts, make_starts
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.situation import FailedReach, Situation
+from lic_drake.starts import FeasibleStarts, make_starts
 from lic_drake.types import Vector
 
 ATTEMPT_COLORS = ("tab:blue", "tab:purple", "tab:green", "tab:olive", "tab:cyan")
@@ -68,7 +68,7 @@ class ShownTrial:
 
 
 def situations(
-    attempts: Sequence[Attempt], starts: Sequence[Starts]
+    attempts: Sequence[Attempt], starts: Sequence[FeasibleStarts]
 ) -> Iterator[tuple[int, Attempt, Situation]]:
     """Yields each attempt with its number, from 1, and the situation in which it was selected.
 

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from lic_drake.evaluate.trial import Attempt
 from lic_drake.perception.observer import Observer
-from lic_drake.reach.pointing_starts import PointingStarts
-from lic_drake.reach.starts import Starts
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.select.lic import LicSelector
 from lic_drake.show.apertures import apertures_figure
@@ -24,6 +22,7 @@ from lic_drake.show.recording import Recording
 from lic_drake.show.stage import in_plane
 from lic_drake.show.stills import save_stills
 from lic_drake.show.views import SIDE, TOP, draw_view
+from lic_drake.starts import BoardStarts, LineStarts
 
 FRAMES_PER_SECOND = 2.0
 """Frames of the film per simulated second."""
@@ -46,7 +45,7 @@ def remove_pictures(out: Path) -> None:
 def save_pictures(
     trial: ShownTrial,
     selector: LicSelector,
-    known: Observer | Starts,
+    known: Observer | BoardStarts | LineStarts,
     out: Path,
     say: Callable[[str], None] = print,
     drake_models: Path | None = None,
@@ -91,7 +90,7 @@ def save_pictures(
         files["sequence"] = out / "sequence.html"
         page = _sequence_page(known, attempts, files, recording)
         files["sequence"].write_text(page, encoding="utf-8")
-    elif isinstance(known, PointingStarts):
+    elif isinstance(known, BoardStarts):
         save("apertures", "apertures.png", apertures_figure(selector, known, attempts))
     else:
         save("density", "density.png", densities_figure(selector, known, attempts))

@@ -9,15 +9,15 @@ from matplotlib.patches import Circle, Patch, Polygon, Rectangle
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.evaluate.trial import Attempt
+from lic_drake.reach.rollout import simulate_request
 from lic_drake.reach.scenario import Scenario
-from lic_drake.reach.session import simulate_request
 from lic_drake.reach.start import Starts
-from lic_drake.reach.starts import make_starts
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.robots.arm import Arm
 from lic_drake.scene.looks import FIXED_COLOR, MOVABLE_COLOR, STEM_COLOR
 from lic_drake.show.figures import ATTEMPT_COLORS
 from lic_drake.show.stage import in_plane
+from lic_drake.starts import make_starts
 from lic_drake.types import Vector
 
 type PlotAxes = tuple[int, int]

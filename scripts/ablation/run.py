@@ -24,7 +24,7 @@ from lic_drake.estimate.rows import feature_scale, group_folds
 from lic_drake.experience.pairs import pair_reaches
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.robots.registry import get_robot
-from lic_drake.select.baselines import corridor_cost
+from lic_drake.select.baselines import Hand, corridor_cost
 from lic_drake.types import Vector
 from scripts.common import RESULTS, make_parser, run_script
 from scripts.cross_validation.scores import log_loss
@@ -79,7 +79,7 @@ def other_features(Z: Vector, x0: Vector) -> dict[str, Vector]:
     poses, index = np.unique(x0, axis=0, return_inverse=True)
     q = np.array([arm.solve_ik(pose)[0] for pose in poses])[index.ravel()]
     p_WG = np.column_stack([goal, np.zeros(len(goal))])
-    cost = [corridor_cost(x0[i : i + 1], p_WG[i])[0] for i in range(len(Z))]
+    cost = [corridor_cost(x0[i : i + 1], p_WG[i], Hand.of(arm))[0] for i in range(len(Z))]
     return {
         "start relative to the goal": np.hstack([goal, y - goal[:, 1:], phi]),
         "angle between hand and goal": np.hstack([goal, y, phi - way]),
@@ -123,7 +123,8 @@ class Choices(NamedTuple):
     def share(self, score: Vector) -> Vector:
         """Returns the success of each choice of the best score, shape (n,); ties share."""
         best = score == score.max(axis=1, keepdims=True)
-        return np.sum(best * self.success, axis=1) / best.sum(axis=1)
+        chosen: Vector = np.sum(best * self.success, axis=1) / best.sum(axis=1)
+        return chosen
 
     def mean(self, values: Vector) -> tuple[float, float]:
         """Returns the weighted mean in percent and its standard error over environments."""

@@ -72,7 +72,8 @@ class HeldOut:
 def goal_of_each(columns: Columns) -> NDArray[np.intp]:
     """Returns the number of each reach's goal (goal_y, goal_z), shape (n,)."""
     goals = np.round(np.column_stack([columns["goal_y"], columns["goal_z"]]), 6)
-    return np.unique(goals, axis=0, return_inverse=True)[1].ravel()
+    goal: NDArray[np.intp] = np.unique(goals, axis=0, return_inverse=True)[1].ravel()
+    return goal
 
 
 def hold_out_goals(name: str, columns: Columns) -> HeldOut:
@@ -127,7 +128,8 @@ def _gap(estimator: SuccessEstimator, seen: Vector, asked: Vector) -> Vector:
     if not isinstance(estimator, NearestNeighbours):
         return np.full(len(asked), np.nan)
     tree = cKDTree(seen / estimator.bandwidth_)
-    return tree.query(asked / estimator.bandwidth_)[0]
+    distance: Vector = tree.query(asked / estimator.bandwidth_)[0]
+    return distance
 
 
 def first_table(results: dict[str, HeldOut], f: Vector) -> Table:

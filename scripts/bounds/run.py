@@ -7,10 +7,9 @@ python scripts/bounds/run.py sphere-aperture-clutter --environments 100 --still 
         --set '{clutter: {num_blocked: 10}}'
 """
 
-from lic_drake.reach.pointing_starts import pointing_starts
 from lic_drake.reach.request import ReachRequest
 from lic_drake.reach.scenario import load_scenario
-from lic_drake.reach.starts import make_starts
+from lic_drake.starts import board_starts, make_starts
 from scripts.common import add_results, add_workers, keep_reaches, make_parser, run_script
 
 
@@ -30,7 +29,7 @@ def main() -> None:
     requests = []
     for environment in range(args.environments):
         instance = scenario.sample_instance(args.stream, environment)
-        grid = (pointing_starts if args.still else make_starts)(scenario, instance).grid
+        grid = (board_starts if args.still else make_starts)(scenario, instance).grid.without_q()
         for goal in range(args.goals):
             at = 0 if args.common_goals else environment
             p_WG = scenario.sample_goal(args.stream, at, goal)

@@ -28,8 +28,9 @@ from lic_drake.evaluate.table import Table
 from lic_drake.evaluate.trials import TrialTable, read_trials
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
+from lic_drake.robots.registry import get_robot
 from lic_drake.seeds import make_generator
-from lic_drake.select.baselines import corridor_cost
+from lic_drake.select.baselines import Hand, corridor_cost
 from lic_drake.select.registry import fit_model
 from lic_drake.types import BoolVector, IntVector, Vector
 from scripts.bounds.optima import (
@@ -225,7 +226,8 @@ def _cost_score(columns: Columns) -> Vector:
     """Returns COST's score of each reach: bases break ties as in its selector, shape (n,)."""
     x0 = np.column_stack([columns[name] for name in ("start_x", "start_y", "start_phi")])
     p_WG = np.column_stack([columns[name] for name in ("goal_x", "goal_y", "goal_z")])
-    cost = [corridor_cost(x0[i : i + 1], p_WG[i])[0] for i in range(len(x0))]
+    hand = Hand.of(get_robot("planar-arm"))
+    cost = [corridor_cost(x0[i : i + 1], p_WG[i], hand)[0] for i in range(len(x0))]
     aside = np.abs(columns["base_y"] - columns["goal_y"])
     return np.asarray(-np.round(cost, 9) - 1e-10 * aside)
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from lic_drake.reach.environment import Environment
-from lic_drake.reach.pointing_starts import pointing_starts
 from lic_drake.reach.scenario import load_scenario
+from lic_drake.starts import board_starts
 from scripts.common import make_parser, run_script, write_report
 
 OFFSETS = ((0.0, 0.0), (0.1, 0.0), (-0.1, 0.0), (0.0, 0.1), (0.0, -0.1))
@@ -25,7 +25,7 @@ def scan(board_x: float, bar_m: float, depth_m: float) -> tuple[np.ndarray, np.n
         f" lower: [{board_x + 0.1}, -0.6, 0.6], upper: [{board_x + 0.2}, 0.0, 1.0]}}}}",
     )
     instance = scenario.sample_instance("calibration", 0)
-    starts = pointing_starts(scenario, instance).grid
+    starts = board_starts(scenario, instance).grid
     environment = Environment(scenario, instance, sleep=False)
     won = [
         sum(

@@ -14,10 +14,10 @@ import numpy as np
 from lic_drake.evaluate.statistics import count, mcnemar
 from lic_drake.evaluate.table import rate_cells
 from lic_drake.evaluate.trial import random_requests
-from lic_drake.reach.pointing_starts import pointing_starts
 from lic_drake.reach.request import ReachRequest
 from lic_drake.reach.scenario import Scenario, load_scenario
 from lic_drake.seeds import make_generator
+from lic_drake.starts import board_starts
 from scripts.common import add_workers, keep_reaches, make_parser, run_script, write_report
 
 PLANAR = {
@@ -51,7 +51,7 @@ def near_requests(scenario: Scenario, count: int) -> list[ReachRequest]:
     for environment in range(count):
         instance = scenario.sample_instance("calibration", environment)
         p_WG = scenario.sample_goal("calibration", environment)
-        starts = pointing_starts(scenario, instance).grid
+        starts = board_starts(scenario, instance).grid.without_q()
         apart = np.linalg.norm(starts.x0[:, 1:3] - p_WG[1:], axis=1)
         rng = make_generator("calibration", "near start", environment)
         i = int(rng.choice(np.argsort(apart)[:NEAR_STARTS]))

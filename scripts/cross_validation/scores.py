@@ -54,7 +54,8 @@ class HeldOutPredictions:
         """
         gain = _log_losses(self.constant, self.rows.y) - _log_losses(self.probability, self.rows.y)
         _, index = np.unique(self.rows.groups, return_inverse=True)
-        return np.bincount(index, gain) / np.bincount(index)
+        by_environment: Vector = np.bincount(index, gain) / np.bincount(index)
+        return by_environment
 
 
 def hold_out_environments(
@@ -170,12 +171,14 @@ def selection_success(score: Vector, rows: ExperienceRows, situation: slice) -> 
     chosen = score == best[choice]
     success = np.bincount(choice[chosen], rows.y[chosen]) / np.bincount(choice[chosen])
     _, environment = np.unique(choices[:, 0], return_inverse=True)
-    return np.bincount(environment, success) / np.bincount(environment)
+    share: Vector = np.bincount(environment, success) / np.bincount(environment)
+    return share
 
 
 def _log_losses(probability: Vector, f: Vector) -> Vector:
     p = np.clip(probability, MIN_PROBABILITY, 1.0 - MIN_PROBABILITY)
-    return -np.where(f > 0.5, np.log(p), np.log1p(-p))
+    losses: Vector = -np.where(f > 0.5, np.log(p), np.log1p(-p))
+    return losses
 
 
 def _standard_error(values: Vector) -> float:

@@ -13,14 +13,14 @@ from lic_drake.experience.schema import scenario_text
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 from lic_drake.reach.request import ReachRequest
+from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario, parse_scenario
-from lic_drake.reach.session import run_reach
 from lic_drake.reach.start import POSE_AXES, Start
-from lic_drake.reach.starts import make_starts
 from lic_drake.seeds import make_generator
 from lic_drake.select.baselines import RandomSelector
 from lic_drake.select.registry import Selector, make_selector, needs_library
 from lic_drake.select.situation import FailedReach, Situation
+from lic_drake.starts import make_starts
 
 OVERRIDES = {"sphere-aperture-clutter": "{clutter: {num_blocked: 10}}"}
 """What the evaluations put over a library's scenario."""

@@ -14,9 +14,9 @@ import numpy as np
 
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.request import ReachRequest
-from lic_drake.reach.starts import make_starts
 from lic_drake.select.registry import make_selector
 from lic_drake.select.situation import Situation
+from lic_drake.starts import make_starts
 from scripts.common import add_workers, keep_reaches, make_parser, run_script
 
 
@@ -47,7 +47,7 @@ def collect(
         if record.success or not np.isfinite(record.final_x):
             continue
         instance = scenario.sample_instance("training", first.environment)
-        grid = make_starts(scenario, instance).grid
+        grid = make_starts(scenario, instance).grid.without_q()
         seconds += [first.then(start) for start in grid]
     keep_reaches(seconds, output, workers)
     return len(seconds)

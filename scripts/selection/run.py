@@ -1,79 +1,118 @@
-"""Checks selections against the library's own starts and a dense scan, on random goals.
+"""Who finds a start: the discrete ones, the lattice, or the program; against random samples.
 
-For each estimator and optimiser: how often the selected start is at least as good as the best
-start of the grid, how often it is within 1 % of the best of a dense scan over (y, phi), and the
-time of a selection.
+Attempts are first ones; each situation is another environment and goal of the holdout stream.
 
-    python scripts/selection/run.py --out notebooks/results/selection.md
+    python scripts/selection/run.py --library models/experience/cylinder-clutter
 """
 
 import argparse
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
 
 from lic_drake.estimate.features import features_of
+from lic_drake.evaluate.table import Table
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
-from lic_drake.reach.start import Starts
-from lic_drake.reach.starts import planar_starts
-from lic_drake.select.objective import Objective
-from lic_drake.select.planar_lic import PlanarLbfgsb, PlanarLic
+from lic_drake.reach.start import Start, Starts
+from lic_drake.seeds import make_generator
+from lic_drake.select.lbfgsb import LbfgsbSelector
+from lic_drake.select.lic import LicSelector
+from lic_drake.select.program import LicProgram
 from lic_drake.select.registry import fit_model
 from lic_drake.select.situation import Situation
+from lic_drake.starts import FeasibleStarts, Region, make_starts
 
-SCAN = (161, 181)
-"""Lattice of the dense scan: y every 5 mm, phi every degree."""
 
-OPTIMISERS = {"MathematicalProgram": PlanarLic, "L-BFGS-B": PlanarLbfgsb}
+class SearchSelector(LicSelector):
+    """LIC without any optimisation: the best of discrete starts and lattice."""
+
+    def improve(self, program: LicProgram, region: Region, start: Start) -> Start | None:
+        """Returns nothing."""
+        return None
+
+
+STAGES = {
+    "lattice": SearchSelector,
+    "L-BFGS-B": LbfgsbSelector,
+    "program": LicSelector,
+}
+"""What makes a selection."""
+
+
+def sample(starts: FeasibleStarts, count: int, rng: np.random.Generator) -> Starts:
+    """Returns uniform samples of all regions, feasible or not."""
+    regions = [starts.regions[i] for i in rng.integers(len(starts.regions), size=count)]
+    x0 = np.array([rng.uniform(region.lower, region.upper) for region in regions])
+    if not starts.arm.is_planar:
+        x0[:, 3:] /= np.linalg.norm(x0[:, 3:], axis=1, keepdims=True)
+    return Starts(
+        x0, np.array([rng.uniform(region.b0_lower, region.b0_upper) for region in regions])
+    )
+
+
+def best_feasible(program: LicProgram, samples: Starts) -> float:
+    """Returns the highest estimate of feasible samples, -inf if there is none."""
+    values = program.estimates(samples)
+    for k in np.argsort(-values):
+        if program.situation.starts.solve(samples.x0[k], samples.b0[k]) is not None:
+            return float(values[k])
+    return -np.inf
+
+
+def check_estimator(library: ExperienceLibrary, estimator: str, args: argparse.Namespace) -> Table:
+    scenario = library.scenario()
+    model = fit_model(estimator, features_of(scenario.category).first, library.columns())
+    values: dict[str, list[float]] = {"discrete": [], "samples": [], **{k: [] for k in STAGES}}
+    seconds: dict[str, list[float]] = {stage: [] for stage in STAGES}
+    for i in range(args.situations):
+        starts = make_starts(scenario, scenario.sample_instance("holdout", i))
+        situation = Situation(p_WG=scenario.sample_goal("holdout", i), starts=starts)
+        program = LicSelector(model).program(situation)
+        values["discrete"].append(float(program.estimates(starts.grid).max()))
+        rng = make_generator("holdout", "samples", i)
+        values["samples"].append(best_feasible(program, sample(starts, args.samples, rng)))
+        for stage, kind in STAGES.items():
+            began = time.perf_counter()
+            chosen = kind(model).select(situation).start
+            seconds[stage].append(time.perf_counter() - began)
+            assert starts.solve(chosen.x0, chosen.b0, near=chosen.q) is not None
+            values[stage].append(float(program.estimates(Starts.of(chosen))[0]))
+    best = np.max([values["samples"], *(values[stage] for stage in STAGES)], axis=0)
+    rows = []
+    for stage, of_stage in values.items():
+        behind = 100.0 * (best - of_stage)
+        rows.append(
+            (
+                *(estimator, stage, f"{100 * np.mean(of_stage):.2f}", f"{behind.mean():.2f}"),
+                *(
+                    f"{behind.max():.2f}",
+                    f"{np.median(seconds[stage]):.3f}" if stage in seconds else "",
+                ),
+            )
+        )
+    return Table(
+        caption=f"{scenario.category}, {args.situations} situations, {args.samples} samples",
+        heading=(
+            *("estimator", "best of", "mean estimate, %", "behind the best of all, points"),
+            *("largest shortfall, points", "median s"),
+        ),
+        rows=tuple(rows),
+    )
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--library", type=Path, default=shipped_library("cylinder-clutter"))
-    parser.add_argument("--situations", type=int, default=200)
+    parser.add_argument("--situations", type=int, default=30)
+    parser.add_argument("--samples", type=int, default=20_000)
     parser.add_argument("--estimators", nargs="+", default=["gp", "knn"])
-    parser.add_argument("--out", type=Path, help="Markdown file")
     args = parser.parse_args()
     library = ExperienceLibrary(args.library)
-    scenario = library.scenario()
-    arm = scenario.arm()
-    if not arm.is_planar:
-        parser.error(f"{args.library} is of another robot than the planar arm")
-    starts = planar_starts(scenario, scenario.sample_instance("holdout", 0))
-    poses = starts.poses.scan(*SCAN)
-    scan = Starts(poses, np.zeros((len(poses), 3)))
-    columns = library.columns()
-    goals = [scenario.sample_goal("holdout", i) for i in range(args.situations)]
-    lines = [
-        "| estimator | optimiser | situations | no worse than every grid start, % |"
-        " within 1 % of the dense scan, % | largest shortfall, points | median s | largest s |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
-    for name in args.estimators:
-        model = fit_model(name, features_of(scenario.category).first, columns)
-        objectives = [Objective(model=model, p_WG=p_WG) for p_WG in goals]
-        scans = [float(np.clip(o.values(scan), 0.0, 1.0).max()) for o in objectives]
-        for optimiser, kind in OPTIMISERS.items():
-            selector = kind(arm, model, method=name)
-            no_worse, within, shortfall, seconds = [], [], [], []
-            for objective, best in zip(objectives, scans, strict=True):
-                chosen = selector.select(Situation(p_WG=objective.p_WG, starts=starts))
-                value, _, _ = objective.value_and_gradient(chosen.start.x0, np.zeros(3))
-                grid = float(objective.values(starts.grid).max())
-                no_worse.append(value >= grid - 1e-9)
-                within.append(np.clip(value, 0.0, 1.0) >= 0.99 * best)
-                shortfall.append(100.0 * (best - np.clip(value, 0.0, 1.0)))
-                seconds.append(chosen.seconds)
-            lines.append(
-                f"| {name} | {optimiser} | {len(goals)} | {100 * np.mean(no_worse):.1f} |"
-                f" {100 * np.mean(within):.1f} | {max(0.0, *shortfall):.2f} |"
-                f" {np.median(seconds):.3f} | {max(seconds):.3f} |"
-            )
-            print(lines[-1], flush=True)
-    if args.out:
-        args.out.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    for estimator in args.estimators:
+        print(check_estimator(library, estimator, args).to_markdown(), flush=True)
     return 0
 
 

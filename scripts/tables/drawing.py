@@ -203,7 +203,8 @@ def _error(results: Sequence[Count]) -> Vector:
     """Returns the distances from rates down and up to their intervals' ends, (2, n), percent."""
     rate = np.array([result.rate for result in results])
     ends = np.array([result.interval() for result in results]).T
-    return 100.0 * np.abs(ends - rate)
+    error: Vector = 100.0 * np.abs(ends - rate)
+    return error
 
 
 def _in_order(methods: Sequence[str]) -> list[str]:

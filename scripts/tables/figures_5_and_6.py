@@ -8,12 +8,12 @@ python scripts/tables/figures_5_and_6.py
 from lic_drake.evaluate.trial import run_trial
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
-from lic_drake.reach.starts import make_starts
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.registry import make_selector
 from lic_drake.show.density import densities_figure
 from lic_drake.show.figures import save_figure
 from lic_drake.show.views import snapshots_figure
+from lic_drake.starts import line_starts
 from scripts.common import add_results, load_trials, make_parser, run_script
 
 
@@ -34,7 +34,7 @@ def main() -> None:
     if not isinstance(selector, LicSelector):
         parser.error(f"the figures show what LIC estimates; {args.method!r} estimates nothing")
     attempts = run_trial(scenario, selector, "evaluation", environment, p_WG, attempts=2)
-    starts = make_starts(scenario, scenario.sample_instance("evaluation", environment))
+    starts = line_starts(scenario, scenario.sample_instance("evaluation", environment))
     folder = args.results / "figures"
     folder.mkdir(parents=True, exist_ok=True)
     save_figure(snapshots_figure(attempts), folder / f"figure_5_{args.category}.png")

@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lic_drake.reach.start import Starts
-from lic_drake.robots.arm import Arm
+from lic_drake.select.lic import LicSelector
 from lic_drake.select.objective import SuccessObjective
-from lic_drake.select.planar_lic import PlanarLic
 from lic_drake.select.situation import FailedReach, Situation
 from lic_drake.types import Vector
 from scripts.unknown_category.final_position import FinalPositions
@@ -72,11 +71,11 @@ class Category:
     """
 
     probability: float
-    lic: PlanarLic
+    lic: LicSelector
     final: FinalPositions | None = None
 
 
-class MixtureLic(PlanarLic):
+class MixtureLic(LicSelector):
     """LIC for a planar arm in clutter of an unknown category.
 
     A first attempt is chosen by the mixture of the LIC-1 of all categories, a further one by that
@@ -88,14 +87,12 @@ class MixtureLic(PlanarLic):
         updates: Whether failures update the belief.
     """
 
-    def __init__(
-        self, arm: Arm, categories: Mapping[str, Category], *, updates: bool = True
-    ) -> None:
+    def __init__(self, categories: Mapping[str, Category], *, updates: bool = True) -> None:
         self.categories = dict(categories)
         self.updates = updates
         self._prior = np.array([category.probability for category in categories.values()])
         likeliest = list(categories.values())[int(np.argmax(self._prior))].lic
-        super().__init__(arm, likeliest.first, likeliest.second, "mixture")
+        super().__init__(likeliest.first, likeliest.second, "mixture")
 
     def objective(self, situation: Situation) -> MixtureObjective:
         """Returns what is maximised in a situation."""

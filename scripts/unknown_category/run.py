@@ -19,12 +19,12 @@ from lic_drake.experience.schema import scenario_text
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 from lic_drake.reach.request import ReachRecord, ReachRequest
+from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario, parse_scenario
-from lic_drake.reach.session import run_reach
-from lic_drake.reach.starts import make_starts
-from lic_drake.select.planar_lic import PlanarLic
+from lic_drake.select.lic import LicSelector
 from lic_drake.select.registry import Selector, make_selector
 from lic_drake.select.situation import FailedReach, Situation
+from lic_drake.starts import make_starts
 from lic_drake.types import BoolVector
 from scripts.common import add_results, make_parser, run_script, write_tables
 from scripts.unknown_category.final_position import FinalPositions
@@ -66,12 +66,12 @@ def make_strategies(
     """
     arm = common_scenario(next(iter(libraries.values()))).arm()
     assert arm.is_planar
-    known: dict[str, PlanarLic] = {}
+    known: dict[str, LicSelector] = {}
     final: dict[str, FinalPositions] = {}
     for name, library in libraries.items():
         columns = library.columns()
         selector = make_selector(estimator, arm, columns, category=name)
-        assert isinstance(selector, PlanarLic)
+        assert isinstance(selector, LicSelector)
         known[name] = selector
         final[name] = FinalPositions.fit(selector.first.features, columns)
 
@@ -80,7 +80,7 @@ def make_strategies(
             name: Category(probability=0.5, lic=lic, final=final[name] if use_final else None)
             for name, lic in known.items()
         }
-        return MixtureLic(arm, categories, updates=updates)
+        return MixtureLic(categories, updates=updates)
 
     mixtures: dict[str, Selector] = {
         "final": mixture(use_final=True),

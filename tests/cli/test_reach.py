@@ -10,8 +10,8 @@ import pytest
 
 from lic_drake.cli.main import main
 from lic_drake.reach.request import OUTCOMES, ReachRecord
+from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import load_scenario
-from lic_drake.reach.session import run_reach
 
 SMALL = "{clutter: {num_movable: 2, num_fixed: 2}, stop: {timeout_s: 0.4}}"
 LIC_REACH = ["reach", "--set", SMALL]
@@ -99,8 +99,8 @@ def test_a_recording_leaves_the_output_to_the_command(tmp_path: Path) -> None:
     ("arguments", "message"),
     [
         (["--goal", "5", "0"], "the goal (5, 0) m is 5.000 m from the base and the arm reaches"),
-        (["--goal", "nan", "0"], "a goal is two finite numbers in metres, got [nan, 0.0, 0.0]"),
-        (["--goal", "0.6", "inf"], "a goal is two finite numbers in metres, got [0.6, inf, 0.0]"),
+        (["--goal", "nan", "0"], "a goal is three finite numbers in metres, got [nan, 0.0, 0.0]"),
+        (["--goal", "0.6", "inf"], "a goal is three finite numbers in metres, got [0.6, inf, 0.0]"),
         (["--goal", "0.6"], "a goal of cylinder-clutter is 2 numbers in metres, got 1: --goal 0.6"),
         (["--start-y", "nan"], "a start is two finite numbers, got y nan m, phi 60.0 degrees"),
         (["--start-phi", "inf"], "a start is two finite numbers, got y 0.0 m, phi inf degrees"),
@@ -160,7 +160,7 @@ def test_a_reach_that_fails_in_the_simulator_is_reported_not_raised(
     def diverge(request: Any) -> ReachRecord:
         return dataclasses.replace(run_reach(request), outcome="diverged", detail="solver failed")
 
-    monkeypatch.setattr("lic_drake.reach.session.run_reach", diverge)
+    monkeypatch.setattr("lic_drake.reach.rollout.run_reach", diverge)
     assert main(LIC_REACH) == 0
     assert capsys.readouterr().out.startswith("diverged after 0.40 s")
 

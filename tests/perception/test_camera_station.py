@@ -75,9 +75,9 @@ def test_the_robot_believes_what_it_saw(station: CameraStation) -> None:
     starts = belief.starts
     # The board is where it was seen, not where it is.
     board, _ = board_of(SCENARIO)
-    shift = starts.all_apertures.mean(axis=0) - look.apertures.p_WA.mean(axis=0)
+    shift = starts.board.aperture_centres().mean(axis=0) - look.apertures.p_WA.mean(axis=0)
     np.testing.assert_allclose(shift, 0.0, atol=1e-9)
-    assert np.linalg.norm(starts.all_apertures[0] - board.aperture_centres()[0]) > 1e-4
+    assert np.linalg.norm(starts.board.aperture_centres()[0] - board.aperture_centres()[0]) > 1e-4
     # Open are those that seem so, and all others have a cover.
     assert set(belief.index) == set(np.flatnonzero(look.apertures.probability_open > 0.5))
     assert starts.instance.num_objects == board.bare_board().num_objects + 20 - len(belief.index)

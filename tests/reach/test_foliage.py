@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from lic_drake.reach.environment import Environment
-from lic_drake.reach.pointing_starts import pointing_starts
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.trace import ReachResult
+from lic_drake.starts import board_starts
 
 SCENARIO = load_scenario("foliage-aperture-clutter", "{stop: {timeout_s: 3.0}}")
 INSTANCE = SCENARIO.sample_instance("calibration", 1)
-STARTS = pointing_starts(SCENARIO, INSTANCE).grid
+STARTS = board_starts(SCENARIO, INSTANCE).grid
 X0 = STARTS.x0[4]
 GOAL = X0[:3] + [0.3, 0.0, 0.0]  # Straight ahead, behind the foliage.
 

@@ -7,16 +7,17 @@ from support.pr2_reaches import ARM, SCENARIO, spheres
 
 from lic_drake.errors import RequestError, ScenarioError
 from lic_drake.experience.collect import CollectionRequest
+from lic_drake.reach import rollout
 from lic_drake.reach.diagram import make_reach_diagram
 from lic_drake.reach.environment import Environment, simulate
-from lic_drake.reach.pointing_starts import pointing_starts, standing_at
 from lic_drake.reach.request import ReachRequest
+from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import load_scenario
-from lic_drake.reach.session import ReachSession, run_reach
 from lic_drake.reach.simulation import Simulation
 from lic_drake.reach.start import Start
 from lic_drake.reach.trace import ReachResult
 from lic_drake.robots.pr2 import Q_HOME
+from lic_drake.starts import board_starts, standing_at
 
 PRECISE = load_scenario("sphere-aperture-clutter", "{stop: {success_distance_m: 0.01}}")
 FREE = Environment(PRECISE, spheres())
@@ -58,7 +59,7 @@ def test_a_forearm_turns_on_beyond_half_a_turn() -> None:
     q[[4, 5]] = 3.1, -1.6
     beyond = q.copy()
     beyond[4] += 1.2
-    simulation = Simulation(make_reach_diagram(PRECISE, spheres()))
+    simulation = Simulation(make_reach_diagram(PRECISE, spheres()), PRECISE.scene)
     result = simulate(simulation, PRECISE, q, ARM.calc_pose(beyond).p_RE)
     assert result.outcome == "reached"
     rolls = np.array(result.trace.q)[:, 4]
@@ -85,7 +86,7 @@ def test_a_torso_beyond_its_range_is_refused() -> None:
 
 def test_a_reach_into_forty_spheres_gives_the_same_record_again() -> None:
     instance = BRIEF.sample_instance("training", 1)
-    start = pointing_starts(BRIEF, instance, standing_at(0.02, 0.16))
+    start = board_starts(BRIEF, instance, standing_at(0.02, 0.16))
     # Base and tool 1 cm nearer to the spheres than starts are: a request may be of any base.
     p_WR, x0 = np.array([0.01, 0.02]), start.grid.x0[8] + np.eye(7)[0] * 0.01
     p_WG = BRIEF.goals("training", 1)[6]
@@ -96,15 +97,16 @@ def test_a_reach_into_forty_spheres_gives_the_same_record_again() -> None:
     assert (record.base_x, record.base_y, record.torso) == (0.01, 0.02, 0.16)
     assert record.in_space
     np.testing.assert_array_equal(record.start.x0, x0)
-    np.testing.assert_allclose(record.q_start, start.grid_angles[8], atol=1e-6)
+    np.testing.assert_allclose(record.q_start, start.grid.q[8], atol=1e-6)
     final = ARM.tip_pose(np.array(record.q_final)) + np.pad([*p_WR, 0.16], (0, 4))
     names = ("x", "y", "z", "qw", "qx", "qy", "qz")
     np.testing.assert_allclose([getattr(record, f"final_{n}") for n in names], final, atol=1e-12)
     assert record.min_distance < np.linalg.norm(p_WG - x0[:3])
     assert ReachRequest.from_record(record, BRIEF) == request
     assert ReachRequest.from_record(record, BRIEF).key == record.key
-    assert comparable([ReachSession().run(request)]) == comparable([record])
-    lone = ReachSession(sleep=False).run(request)
+    rollout._environments.clear()
+    assert comparable([run_reach(request)]) == comparable([record])
+    lone = run_reach(request, sleep=False)
     assert lone.outcome == record.outcome
     np.testing.assert_allclose(lone.q_final, record.q_final, atol=1e-3)
 
@@ -135,7 +137,7 @@ def test_a_collections_reaches_are_counted_where_starts_differ_from_place_to_pla
 
 def test_a_further_reach_finds_the_spheres_where_the_first_left_them() -> None:
     p_WG = BRIEF.goals("training", 2)[4]
-    starts = pointing_starts(BRIEF, BRIEF.sample_instance("training", 2)).grid
+    starts = board_starts(BRIEF, BRIEF.sample_instance("training", 2)).grid.without_q()
     first = ReachRequest(BRIEF, "training", 2, p_WG, starts[7])
     second = first.then(Start(starts.x0[8], np.array([0.0, 0.0, 0.16])))
     assert (second.start.b0[2], second.after[0].b0[2]) == (0.16, 0.15)

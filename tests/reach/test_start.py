@@ -44,4 +44,6 @@ def test_a_batch_is_taken_and_joined_row_by_row() -> None:
     assert Starts.of(batch[2])[0] == batch[2]
     np.testing.assert_allclose(some.in_R[1], batch[0].x0_R)
     without = some.join(Starts(x0, x0))
-    assert without.q is None and len(without) == 7
+    assert len(without) == 7
+    assert [start.q is None for start in without] == [False] * 3 + [True] * 4
+    assert without.without_q().q is None

@@ -6,12 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 from support.select_surfaces import Bumps
-from support.starts import ARM, LINE
+from support.starts import LINE
 
 from lic_drake.estimate.features import PLANAR_LIC1, features_of
 from lic_drake.reach.start import Start
+from lic_drake.select.lic import LicSelector
 from lic_drake.select.objective import SuccessModel
-from lic_drake.select.planar_lic import PlanarLic
 from lic_drake.select.situation import FailedReach, Situation
 from lic_drake.types import Vector
 from scripts.unknown_category.mixture import Category, MixtureLic, posterior
@@ -29,24 +29,24 @@ def surface(at_one: float, at_two: float) -> SuccessModel:
     return SuccessModel(estimator=bumps, features=PLANAR_LIC1)
 
 
-def lic(at_one: float, at_two: float, second: tuple[float, float] | None = None) -> PlanarLic:
+def lic(at_one: float, at_two: float, second: tuple[float, float] | None = None) -> LicSelector:
     if second is None:
-        return PlanarLic(ARM, surface(at_one, at_two))
+        return LicSelector(surface(at_one, at_two))
     estimator = surface(*second).estimator
     observing = SuccessModel(estimator=estimator, features=features_of("cylinder-clutter").second)
-    return PlanarLic(ARM, surface(at_one, at_two), observing)
+    return LicSelector(surface(at_one, at_two), observing)
 
 
-def mixture(prior: float, one: PlanarLic, two: PlanarLic, **values: object) -> MixtureLic:
+def mixture(prior: float, one: LicSelector, two: LicSelector, **values: object) -> MixtureLic:
     categories = {
         "one": Category(probability=prior, lic=one),
         "two": Category(probability=1.0 - prior, lic=two),
     }
-    return MixtureLic(ARM, categories, **values)
+    return MixtureLic(categories, **values)
 
 
 def failed_at(start: Vector, final: tuple[float, float] = (0.45, 0.05)) -> FailedReach:
-    x0 = np.array([LINE.poses.line.x_m, *start])
+    x0 = np.array([LINE.line.x_m, *start])
     known = FailedReach.from_start(Start(x0))
     names = ("final_x", "final_y", "final_phi", "final_vx", "final_vy")
     shown = dict(zip(names, (*final, 0.3, 0.01, -0.02), strict=True))
@@ -107,8 +107,8 @@ def test_where_a_failure_ended_tells_categories_apart_that_fail_as_often() -> No
         name: Category(probability=0.5, lic=lic(0.5, 0.5), final=EndsAt(y))
         for name, y in (("left", 0.2), ("right", -0.2))
     }
-    selector = MixtureLic(ARM, categories)
+    selector = MixtureLic(categories)
     assert selector.belief(after(failed_at(ONE, (0.5, 0.2))))["left"] == pytest.approx(0.9)
     assert selector.belief(after(failed_at(ONE, (0.5, -0.2))))["left"] == pytest.approx(0.1)
-    unseen = FailedReach.from_start(Start(np.array([LINE.poses.line.x_m, *ONE])))
+    unseen = FailedReach.from_start(Start(np.array([LINE.line.x_m, *ONE])))
     assert selector.belief(after(unseen))["left"] == pytest.approx(0.5)

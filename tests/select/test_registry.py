@@ -10,8 +10,7 @@ from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.start import Start
 from lic_drake.robots.pr2 import pr2_arm
 from lic_drake.select.baselines import CostSelector, RandomSelector
-from lic_drake.select.planar_lic import PlanarLic
-from lic_drake.select.pointing_lic import PointingLic
+from lic_drake.select.lic import LicSelector
 from lic_drake.select.registry import (
     FallbackSelector,
     Selector,
@@ -59,7 +58,7 @@ def test_what_learns_needs_a_library(method: str) -> None:
 
 def test_only_the_plain_name_has_lic2(columns: dict[str, np.ndarray]) -> None:
     both, first = make_selector("knn", ARM, columns), make_selector("knn1", ARM, columns)
-    assert isinstance(both, PlanarLic) and isinstance(first, PlanarLic)
+    assert isinstance(both, LicSelector) and isinstance(first, LicSelector)
     assert first.second is None
     assert both.second is not None
     assert both.second.features.observed == (
@@ -102,6 +101,6 @@ def test_behind_a_board_there_is_no_lic_2_and_pairs_for_it_are_refused() -> None
     columns |= {"environment": np.arange(n) // 6, "stream": np.full(n, "training")}
     category = "sphere-aperture-clutter"
     selector = make_selector("knn", pr2_arm(), columns, category=category)
-    assert isinstance(selector, PointingLic) and selector.second is None
+    assert isinstance(selector, LicSelector) and selector.second is None
     with pytest.raises(RequestError, match="sphere-aperture-clutter has no LIC-2"):
         make_selector("knn", pr2_arm(), columns, category=category, pairs=columns)

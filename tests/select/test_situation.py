@@ -8,11 +8,10 @@ from support.fake_reach import make_record
 from support.reaches import reach_request
 from support.starts import APERTURES, LINE
 
-from lic_drake.errors import RequestError
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.start import Start, Starts
-from lic_drake.reach.starts import ApertureStarts, LineStarts
 from lic_drake.select.situation import FailedReach, Situation
+from lic_drake.starts import LineStarts
 
 GOAL = np.array([0.6, 0.1, 0.0])
 
@@ -27,7 +26,7 @@ def failed_from(y_m: float) -> FailedReach:
     st.floats(-0.4, 0.4),
 )
 def test_free_regions_are_the_allowed_positions(
-    starts: LineStarts | ApertureStarts, failed_y: list[float], y: float
+    starts: LineStarts, failed_y: list[float], y: float
 ) -> None:
     if starts is APERTURES:
         y = float(APERTURES.p_WA[np.argmin(np.abs(APERTURES.p_WA[:, 1] - y)), 1])
@@ -50,8 +49,8 @@ def test_free_regions_are_the_allowed_positions(
         ]
         assert len(parents) == 1
         np.testing.assert_array_equal(region.lower[[0, 2]], parents[0].lower[[0, 2]])
-        np.testing.assert_array_equal(region.base_lower, parents[0].base_lower)
-        np.testing.assert_array_equal(region.base_upper, parents[0].base_upper)
+        np.testing.assert_array_equal(region.b0_lower, parents[0].b0_lower)
+        np.testing.assert_array_equal(region.b0_upper, parents[0].b0_upper)
 
 
 @given(
@@ -60,7 +59,7 @@ def test_free_regions_are_the_allowed_positions(
     st.lists(st.integers(0, 17), max_size=25),
 )
 def test_the_neighbourhood_of_failures_is_as_large_as_leaves_a_start_of_the_grid(
-    starts: LineStarts | ApertureStarts, failed_y: list[float], failed_rows: list[int]
+    starts: LineStarts, failed_y: list[float], failed_rows: list[int]
 ) -> None:
     grid = starts.grid
     failed = [failed_from(value) for value in failed_y]
@@ -73,8 +72,8 @@ def test_the_neighbourhood_of_failures_is_as_large_as_leaves_a_start_of_the_grid
     )
     repeated = np.array(
         [
-            any(np.allclose(x0, r.start.x0) and np.allclose(p_WR, r.start.b0[:2]) for r in failed)
-            for x0, p_WR in zip(grid.x0, grid.p_WR, strict=True)
+            any(np.allclose(x0, r.start.x0) and np.allclose(b0, r.start.b0) for r in failed)
+            for x0, b0 in zip(grid.x0, grid.b0, strict=True)
         ]
     )
     np.testing.assert_array_equal(situation.untried(grid), ~repeated)
@@ -112,9 +111,6 @@ class InSpace:
         torso_m = np.repeat([0.1, 0.2], len(x0))
         self.grid = Starts(np.vstack([x0, x0]), np.pad(torso_m[:, None], ((0, 0), (2, 0))))
 
-    def angles(self, x0: np.ndarray, p_WR: np.ndarray, torso_m: float) -> np.ndarray | None:
-        return np.zeros(7)
-
 
 def test_in_space_starts_keep_their_distance_across_x_in_both_directions() -> None:
     starts = InSpace()
@@ -136,7 +132,7 @@ def test_the_same_pose_from_another_torso_is_another_start() -> None:
     starts = InSpace()
     failed = tuple(FailedReach.from_start(starts.grid[i]) for i in range(6))
     situation = Situation(p_WG=GOAL, starts=starts, failed=failed)
-    from_above = starts.grid.torso_m == 0.2
+    from_above = starts.grid.b0[:, 2] == 0.2
     np.testing.assert_array_equal(situation.untried(starts.grid), from_above)
     # No place is left at a distance, so that all that did not fail may be tried.
     assert situation.retry_distance_m == -1.0
@@ -162,10 +158,3 @@ def test_a_failed_reach_in_space_shows_heights_and_torso_of_its_record() -> None
     )
     assert failed.start.b0[2] == 0.2
     assert [failed.shown[name] for name in list(heights)[:4]] == [0.9, 0.6, 1.0, -0.1]
-
-
-def test_what_is_planar_is_refused_in_space() -> None:
-    situation = Situation(p_WG=GOAL, starts=InSpace())
-    for ask in (lambda: situation.planar_starts, situation.free_regions):
-        with pytest.raises(RequestError, match="needs the start line of a planar arm"):
-            ask()

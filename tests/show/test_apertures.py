@@ -7,7 +7,6 @@ from support.ray_casting import blank, tilted
 
 from lic_drake.perception.apertures import DetectedApertures
 from lic_drake.perception.goal import DetectedGoal
-from lic_drake.reach.pointing_starts import pointing_starts
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.start import Starts
 from lic_drake.select.objective import Objective
@@ -18,9 +17,10 @@ from lic_drake.show.detections import (
     draw_goal,
     draw_passable_probability,
 )
+from lic_drake.starts import board_starts
 
 BLOCKED = load_scenario("sphere-aperture-clutter", "{clutter: {num_blocked: 6}}")
-STARTS = pointing_starts(BLOCKED, BLOCKED.sample_instance("holdout", 0))
+STARTS = board_starts(BLOCKED, BLOCKED.sample_instance("holdout", 0))
 IMAGE = blank(tilted(0.0), np.array([0.0, 0.0, 1.0]))
 CENTRES = np.array([[1.0, 0.1 * k, 1.0] for k in (-2, 0, 2)])
 CORNERS = CENTRES[:, None] + 0.05 * np.array([[0, -1, -1], [0, 1, -1], [0, 1, 1], [0, -1, 1]])

@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 from support.pr2_reaches import SCENARIO
 
-from lic_drake.reach.pointing_starts import pointing_starts
 from lic_drake.show.approach import RETREAT_STEP_M, WAITING_DEG, Approach
+from lic_drake.starts import board_starts
 
 INSTANCE = SCENARIO.sample_instance("training", 0)
-STARTS = pointing_starts(SCENARIO, INSTANCE)
+STARTS = board_starts(SCENARIO, INSTANCE)
 APPROACH = Approach(SCENARIO, INSTANCE)
 
 
 # To the last one the direct way is blocked, and the arm's limits allow no straight way.
 @pytest.mark.parametrize(("index", "straight"), [(0, True), (16, True), (9, False)])
 def test_the_arm_comes_straight_in_and_touches_nothing(index: int, straight: bool) -> None:
-    b0, q_start = STARTS.grid.b0[index], STARTS.grid_angles[index]
+    b0, q_start = STARTS.grid.b0[index], STARTS.grid.q[index]
     path = APPROACH.path(b0, q_start)
     np.testing.assert_allclose(path[[0, -1]], [np.deg2rad(WAITING_DEG), q_start])
     arm = SCENARIO.arm()

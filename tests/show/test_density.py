@@ -6,20 +6,20 @@ from support.select_surfaces import random_model
 from support.starts import APERTURES, ARM, LINE
 
 from lic_drake.reach.start import Start
-from lic_drake.reach.starts import ApertureStarts, LineStarts
-from lic_drake.select.planar_lic import PlanarLic
+from lic_drake.select.lic import LicSelector
 from lic_drake.select.situation import Situation
 from lic_drake.show.density import DENSITY_SHAPE, density_lattice, draw_density, estimate_density
 from lic_drake.show.figures import ATTEMPT_COLORS
+from lic_drake.starts import LineStarts
 
 GOAL = np.array([0.6, 0.1, 0.0])
 
 
 @pytest.mark.parametrize("starts", [LINE, APERTURES], ids=["line", "apertures"])
 def test_a_lattice_covers_the_line_relative_to_the_base_in_every_region(
-    starts: LineStarts | ApertureStarts,
+    starts: LineStarts,
 ) -> None:
-    line = starts.poses.line
+    line = starts.line
     for region in starts.regions:
         lattice = density_lattice(starts, region)
         y, phi = (lattice.in_R[:, i].reshape(DENSITY_SHAPE) for i in (1, 2))
@@ -37,10 +37,10 @@ def test_a_lattice_covers_the_line_relative_to_the_base_in_every_region(
 
 @pytest.mark.parametrize("starts", [LINE, APERTURES], ids=["line", "apertures"])
 def test_estimates_are_the_models_where_the_arm_can_start(
-    starts: LineStarts | ApertureStarts,
+    starts: LineStarts,
 ) -> None:
     model = random_model(3)
-    selector = PlanarLic(ARM, model)
+    selector = LicSelector(model)
     lattice = density_lattice(starts, starts.regions[0])
     some = lattice.take(np.arange(0, len(lattice), 97))
     density = estimate_density(selector, Situation(p_WG=GOAL, starts=starts), some)

@@ -14,11 +14,11 @@ from support.worlds import ARM, box, corners, cylinder, make_clutter
 from lic_drake.clutter.registry import category_names
 from lic_drake.errors import LicError
 from lic_drake.reach.scenario import load_scenario
-from lic_drake.reach.starts import make_starts
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.scene.looks import FIXED_COLOR, MOVABLE_COLOR
 from lic_drake.show.figures import ATTEMPT_COLORS, save_figure
 from lic_drake.show.views import FRONT, SIDE, draw_view
+from lic_drake.starts import make_starts
 
 P_WG = np.array([0.6, 0.1, 0.0])
 CLUTTER = make_clutter(

@@ -1,0 +1,83 @@
+"""Feasible initial conditions (x0, b0) of an arm in an environment (paper Eqs. 3 and 4)."""
+
+from dataclasses import replace
+
+from lic_drake.clutter.board import ApertureBoard
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.errors import ScenarioError
+from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.start import Starts
+from lic_drake.reach.task import Stand
+from lic_drake.starts.board import BoardStarts, standing_at
+from lic_drake.starts.feasible import FeasibleStarts
+from lic_drake.starts.line import LineStarts
+from lic_drake.starts.region import Region, find_regions
+
+__all__ = [
+    "BoardStarts",
+    "FeasibleStarts",
+    "LineStarts",
+    "Region",
+    "board_starts",
+    "find_regions",
+    "line_starts",
+    "make_starts",
+    "standing_at",
+    "training_starts",
+]
+
+
+def make_starts(
+    scenario: Scenario, instance: ClutterInstance, moves: bool = True
+) -> LineStarts | BoardStarts:
+    """Returns the initial conditions that are feasible in an environment of a scenario.
+
+    Args:
+        scenario: The scenario.
+        instance: The environment.
+        moves: Whether base and torso before a board may move as the task allows; without, they
+            stay where they are.
+
+    Raises:
+        ScenarioError: The arm moves in space and there is no board of apertures.
+    """
+    if scenario.arm().is_planar:
+        return line_starts(scenario, instance)
+    return board_starts(scenario, instance, scenario.task.stand if moves else None)
+
+
+def line_starts(scenario: Scenario, instance: ClutterInstance) -> LineStarts:
+    """Returns the starts of an arm in the plane: on a line, or at apertures from a track."""
+    task, starts = scenario.task, LineStarts(robot=scenario.arm(), line=scenario.task.start_line)
+    if task.base is None or instance.p_WA is None:
+        return starts
+    return replace(starts, track=task.base, p_WA=instance.p_WA)
+
+
+def board_starts(
+    scenario: Scenario, instance: ClutterInstance, stand: Stand | None = None
+) -> BoardStarts:
+    """Returns the starts of an arm in space at the open apertures of an environment.
+
+    Args:
+        scenario: The scenario.
+        instance: The environment.
+        stand: Where base and torso may be; by default they do not move.
+
+    Raises:
+        ScenarioError: The arm is one of the plane, or the environment has no board of apertures.
+    """
+    board = isinstance(scenario.clutter, ApertureBoard) and instance.p_WA is not None
+    if scenario.arm().is_planar or not board:
+        raise ScenarioError(
+            "starts in apertures need an arm in space, as pr2, and a board of apertures, as in"
+            f" sphere-aperture-clutter; {scenario.category} with {scenario.robot} has other starts"
+        )
+    stand = stand or standing_at(0.0, scenario.task.torso_m)
+    return BoardStarts(scenario=scenario, instance=instance, stand=stand)
+
+
+def training_starts(scenario: Scenario, stream: str, environment: int) -> Starts:
+    """Returns the starts that a collection tries in an environment."""
+    instance = scenario.sample_instance(stream, environment)
+    return make_starts(scenario, instance).training(stream, environment)

@@ -1,0 +1,260 @@
+"""Starts of an arm in space: the hand in the centre of an aperture, pointing in (paper IV-B)."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from itertools import product
+
+import numpy as np
+
+from lic_drake.clutter.board import ApertureBoard
+from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.errors import RequestError
+from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.start import Start, Starts
+from lic_drake.reach.task import Stand
+from lic_drake.robots.arm import Arm
+from lic_drake.scene.collision import CollisionChecker
+from lic_drake.scene.scene import SceneConfig
+from lic_drake.starts.feasible import Effort, FeasibleStarts
+from lic_drake.starts.region import TOLERANCE, Region
+from lic_drake.types import Vector
+
+GRID_M = (0.1, 0.05)
+"""Distances of neighbouring bases and of heights of the torso in the grid, metres."""
+
+LATTICE_M = 0.025
+"""Largest distance of neighbouring bases and heights of the torso in the lattice, metres."""
+
+INTO_CLUTTER = np.array([1.0, 0.0, 0.0])
+"""The way from the robot into the clutter, along which the hand points."""
+
+_DECIMALS = 6
+"""To the micrometre, as places are chosen: what is equal but for rounding is one place."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BoardStarts(FeasibleStarts):
+    """Starts at the open apertures of a board, from the bases and torso heights of a stand.
+
+    A redundant arm has one preferred configuration for each: of those in which it touches neither
+    board nor body the one of least cost, Eq. (5).
+
+    Attributes:
+        scenario: The scenario, with an arm in space and a board of apertures.
+        instance: The environment.
+        stand: Where base and torso may be.
+        probability_open: How likely each open aperture really is open, shape (k,); None where that
+            is certain.
+    """
+
+    scenario: Scenario
+    instance: ClutterInstance
+    stand: Stand
+    probability_open: Vector | None = None
+
+    effort = Effort(
+        steps_m=(0.0125, 0.00625, 0.003125), solves=100, solves_per_region=1, max_gain=0.02
+    )
+
+    @property
+    def arm(self) -> Arm:
+        """The robot."""
+        return self.scenario.arm()
+
+    @property
+    def p_WA(self) -> Vector:
+        """Centres of the open apertures, shape (k, 3), metres."""
+        assert self.instance.p_WA is not None
+        return self.instance.p_WA
+
+    @property
+    def board(self) -> ApertureBoard:
+        """The board with all its apertures, open or blocked."""
+        assert isinstance(self.scenario.clutter, ApertureBoard)
+        return self.scenario.clutter
+
+    @cached_property
+    def regions(self) -> tuple[Region, ...]:
+        """One for each open aperture: base, torso and the roll of the hand are free."""
+        b0_lower, b0_upper = self._ends
+        # Turns about Wx are quaternions (cos, sin, 0, 0) of half the angle.
+        return tuple(
+            Region(
+                lower=np.array([*p_WA, 0.0, -1.0, 0.0, 0.0]),
+                upper=np.array([*p_WA, 1.0, 1.0, 0.0, 0.0]),
+                b0_lower=b0_lower,
+                b0_upper=b0_upper,
+            )
+            for p_WA in self.p_WA
+        )
+
+    @property
+    def home(self) -> Vector:
+        """Base and torso where the task has them, shape (3,), metres."""
+        return np.array([0.0, 0.0, self.scenario.task.torso_m])
+
+    @cached_property
+    def checker(self) -> CollisionChecker:
+        """The mobile robot before the board."""
+        return CollisionChecker(self.arm, self.instance, self.scenario.scene)
+
+    @cached_property
+    def grid(self) -> Starts:
+        """All open apertures, from bases and heights of the torso in equal steps."""
+        (_, y_min, torso_min), (_, y_max, torso_max) = self._ends
+        y, torso = _steps(y_min, y_max, GRID_M[0]), _steps(torso_min, torso_max, GRID_M[1])
+        b0 = tuple((0.0, *place) for place in product(y.tolist(), torso.tolist()))
+        found = _preferred_before_bare_board(self.arm, _numbers(self.board), b0)
+        if len(self.p_WA) == len(self.board.aperture_centres()):
+            return found
+        assert found.q is not None
+        apart = np.linalg.norm(found.x0[:, None, :3] - self.p_WA, axis=2).min(axis=1)
+        free = [
+            near <= TOLERANCE and not self.checker.touches(place, q)
+            for near, place, q in zip(apart, found.b0, found.q, strict=True)
+        ]
+        return found.take(np.array(free))
+
+    def lattice(self, values: Vector) -> Starts:
+        """Returns bases and torsos all over the stand, each aperture with the hand of its best.
+
+        Among them are all from which the robot has this aperture where it had one when it learned:
+        an L1 kernel has kinks there, and the process its peaks.
+        """
+        found = self.grid.take(np.zeros(0, dtype=int))
+        (_, y_min, torso_min), (_, y_max, torso_max) = self._ends
+        for p_WA in self.p_WA:
+            here = np.all(np.isclose(self.grid.x0[:, :3], p_WA), axis=1)
+            if np.all(values[here] == -np.inf):
+                continue
+            x0 = self.grid.x0[np.flatnonzero(here)[np.argmax(values[here])]]
+            _, across, up = (x0[:3] - self.board.aperture_centres()).T
+            learned = np.add.outer(across, self.stand.training_y_m)
+            y = _merge(_steps(y_min, y_max, LATTICE_M), learned)
+            learned = np.add.outer(up, self.stand.training_torso_m)
+            torso = _merge(_steps(torso_min, torso_max, LATTICE_M), learned)
+            b0 = np.array([[0.0, *place] for place in product(y, torso)])
+            found = found.join(Starts(np.tile(x0, (len(b0), 1)), b0))
+        return found
+
+    def neighbours(self, some: Starts, step_m: float) -> Starts:
+        """Returns the eight neighbours of each base and torso height, each once."""
+        steps = np.array([[0.0, *s] for s in product((-step_m, 0.0, step_m), repeat=2) if any(s)])
+        b0 = np.round(np.clip(some.b0[:, None] + steps, *self._ends), _DECIMALS).reshape(-1, 3)
+        x0 = np.repeat(some.x0, len(steps), axis=0)
+        _, first = np.unique(np.hstack([x0, b0]), axis=0, return_index=True)
+        return Starts(x0[first], b0[first])
+
+    def solve(self, x0: Vector, b0: Vector, near: Vector | None = None) -> Vector | None:
+        """Returns joint angles for a hand pose from a base, else None; see `FeasibleStarts`."""
+        if not any(region.holds(x0, b0) for region in self.regions):
+            return None
+        x0_R = Start(x0, b0).x0_R
+        return self.checker.first_free(b0, self.arm.solve_ik(x0_R, near))
+
+    def nearest(self, x0: Vector, b0: Vector) -> Start | None:
+        """Returns what Eq. (5) prefers in the aperture of a hand pose from a base, else None."""
+        (found,) = _preferred(self.arm, self.checker, x0[None, :3], b0)
+        return found
+
+    def at(self, p_WA: Vector, b0: Vector) -> Start | None:
+        """Returns what Eq. (5) prefers in an aperture, shape (3,), from a base; None if nothing."""
+        return self.nearest(np.append(p_WA, [1.0, 0.0, 0.0, 0.0]), b0)
+
+    def chance(self, x0: Vector) -> Vector:
+        """Returns how likely the apertures of n hand poses are open, shape (n,)."""
+        if self.probability_open is None:
+            return np.ones(len(x0))
+        apart = np.linalg.norm(x0[:, None, :3] - self.p_WA, axis=2)
+        return self.probability_open[np.argmin(apart, axis=1)]
+
+    def training(self, stream: str, environment: int) -> Starts:
+        """Returns one for each aperture, from the environment's place of the training stand."""
+        place = standing_at(*self.stand.for_training(environment))
+        return replace(self, stand=place).grid.without_q()
+
+    def nearest_aperture(self, y_m: float, z_m: float) -> Vector:
+        """Returns the centre of the open aperture at a place in the board, shape (3,), metres.
+
+        Raises:
+            RequestError: There is none.
+        """
+        distance = np.linalg.norm(self.p_WA[:, 1:] - [y_m, z_m], axis=1)
+        p_WA: Vector = self.p_WA[np.argmin(distance)]
+        if not distance.min() <= 0.5 * self.board.aperture_m:
+            raise RequestError(
+                f"there is no open aperture at y {y_m} m, z {z_m} m; the nearest is at y"
+                f" {p_WA[1]:.3f} m, z {p_WA[2]:.3f} m"
+            )
+        return p_WA
+
+    @property
+    def _ends(self) -> tuple[Vector, Vector]:
+        low = np.array([0.0, self.stand.y_min_m, self.stand.torso_min_m])
+        return low, np.array([0.0, self.stand.y_max_m, self.stand.torso_max_m])
+
+
+def standing_at(y_m: float, torso_m: float) -> Stand:
+    """Returns one place of the base and one height of the torso, metres."""
+    return Stand(
+        y_min_m=y_m,
+        y_max_m=y_m,
+        torso_min_m=torso_m,
+        torso_max_m=torso_m,
+        training_y_m=[y_m],
+        training_torso_m=[torso_m],
+    )
+
+
+_Numbers = tuple[tuple[str, object], ...]
+
+
+def _numbers(board: ApertureBoard) -> _Numbers:
+    names = ("columns", "rows", "aperture_m", "bar_m")
+    centre = ("board_centre", tuple(board.board_centre))
+    return (centre, *((name, getattr(board, name)) for name in names))
+
+
+@lru_cache(maxsize=64)
+def _preferred_before_bare_board(
+    arm: Arm, board: _Numbers, b0: tuple[tuple[float, ...], ...]
+) -> Starts:
+    """Returns what Eq. (5) prefers in each aperture from each base, where there is anything.
+
+    All environments of a scenario have the same board, but for what is blocked.
+    """
+    bare = ApertureBoard(**dict(board)).bare_board()  # type: ignore[arg-type]
+    assert bare.p_WA is not None
+    checker = CollisionChecker(arm, bare, SceneConfig())
+    found = [
+        start
+        for place in b0
+        for start in _preferred(arm, checker, bare.p_WA, np.array(place))
+        if start is not None
+    ]
+    x0 = np.array([start.x0 for start in found]).reshape(-1, 7)
+    q = np.array([start.q for start in found]).reshape(-1, len(arm.q_min))
+    return Starts(x0, np.array([start.b0 for start in found]).reshape(-1, 3), q)
+
+
+def _preferred(
+    arm: Arm, checker: CollisionChecker, p_WA: Vector, b0: Vector
+) -> Iterator[Start | None]:
+    """Yields what Eq. (5) prefers in each of k apertures, shape (k, 3), from a base."""
+    for p_WE, angles in zip(p_WA, arm.solve_pointing(p_WA - b0, INTO_CLUTTER), strict=True):
+        q = checker.first_free(b0, angles)
+        # Exactly the centre; of the pose only the roll is left to the arm.
+        yield None if q is None else Start(np.append(p_WE, arm.tip_pose(q)[3:]), b0, q)
+
+
+def _steps(low: float, high: float, step: float) -> Vector:
+    """Returns numbers from low to high, both included, apart by at most a step."""
+    count = int(np.ceil((high - low) / step - 1e-9)) + 1
+    return np.round(np.linspace(low, high, count), _DECIMALS)
+
+
+def _merge(steps: Vector, more: Vector) -> Vector:
+    """Returns steps and those of more numbers that lie between their ends, in order."""
+    inside = more[(more > steps[0]) & (more < steps[-1])]
+    return np.unique(np.round(np.append(steps, inside), _DECIMALS))

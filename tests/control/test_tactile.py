@@ -1,0 +1,188 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lic_drake.control.tactile import ContactPatch, calc_taxel_forces
+from lic_drake.control.taxels import planar_taxels
+from lic_drake.robots.planar import planar_arm
+
+ARM = planar_arm()
+LAYOUT = planar_taxels(ARM.skin)
+POSES = ARM.calc_pose(np.deg2rad([-30.0, 60.0, 50.0]))[:2]
+ANGLE = st.floats(-np.pi, np.pi)
+LINK = st.integers(0, 2)
+
+
+def place(link: int, p_L: np.ndarray) -> np.ndarray:
+    """Points of a link in R, shape (n, 3)."""
+    R_RL, p_RL = POSES
+    return p_RL[link] + p_L @ R_RL[link].T
+
+
+def turn(link: int, v_L: np.ndarray) -> np.ndarray:
+    """Vectors of a link in R."""
+    return v_L @ POSES[0][link].T
+
+
+def make_patch(link: int, p_RQ: np.ndarray, f_R: np.ndarray) -> ContactPatch:
+    """A patch from the forces of the link on the object at its faces."""
+    force = np.linalg.norm(f_R, axis=1)
+    n_R = f_R / np.where(force > 0.0, force, 1.0)[:, None]
+    return ContactPatch(link=link, p_RQ=p_RQ, n_R=n_R, force=force)
+
+
+def press(link: int, p_L: np.ndarray, f_L: np.ndarray) -> np.ndarray:
+    """Taxel forces of one patch whose faces are given in the link's frame."""
+    patch = make_patch(link, place(link, p_L), turn(link, f_L))
+    return calc_taxel_forces(LAYOUT, *POSES, [patch])
+
+
+@pytest.mark.parametrize("taxel", range(188))
+def test_a_contact_at_a_taxel_along_its_normal_lights_up_that_taxel_alone(taxel: int) -> None:
+    forces = press(LAYOUT.link[taxel], LAYOUT.p_LT[[taxel]], 3.0 * LAYOUT.n_L[[taxel]])
+    expected = np.zeros(188)
+    expected[taxel] = 3.0
+    np.testing.assert_allclose(forces, expected, atol=1e-12)
+
+
+POINT = st.tuples(st.floats(-0.02, 0.02), st.floats(-0.35, 0.02), st.floats(-0.02, 0.02))
+
+
+@given(LINK, POINT, ANGLE, st.floats(1e-3, 100.0))
+def test_a_point_contact_loads_one_taxel_of_its_link_with_its_whole_force(
+    link: int, point: tuple[float, float, float], angle: float, force: float
+) -> None:
+    direction = np.array([[np.cos(angle), np.sin(angle), 0.0]])
+    forces = press(link, np.array([point]), force * direction)
+    (loaded,) = np.flatnonzero(forces)
+    assert LAYOUT.link[loaded] == link
+    assert forces[loaded] == pytest.approx(force)
+    # The rule in plain words: no taxel within 45 degrees of the force is nearer.
+    mine = np.flatnonzero(LAYOUT.link == link)
+    distance = np.linalg.norm(LAYOUT.p_LT[mine] - point, axis=1)
+    facing = np.rad2deg(np.arccos(np.clip(LAYOUT.n_L[mine] @ direction[0], -1.0, 1.0)))
+    own = np.flatnonzero(mine == loaded)[0]
+    assert facing[own] < 45.0 + 1e-6
+    assert distance[own] <= distance[facing < 45.0 - 1e-6].min() + 1e-12
+
+
+def test_the_45_degree_rule_sends_a_force_to_the_taxel_that_faces_it() -> None:
+    # Near the end of link 3's side: a force along the arm belongs to the cap, one across to
+    # the side, though the point of contact is the same.
+    corner = np.array([[0.012, -0.276, 0.0]])
+    for degrees, faces_side in ((0.0, True), (40.0, True), (80.0, False)):
+        a = np.deg2rad(degrees)
+        forces = press(2, corner, np.array([[np.cos(a), -np.sin(a), 0.0]]))
+        (loaded,) = np.flatnonzero(forces)
+        angle = np.rad2deg(np.arccos(LAYOUT.n_L[loaded] @ [np.cos(a), -np.sin(a), 0.0]))
+        assert angle <= 45.0
+        assert (LAYOUT.n_L[loaded, 0] > 0.7) == faces_side
+
+
+def test_a_force_that_no_taxel_faces_is_not_lost() -> None:
+    forces = press(1, np.array([[0.0, -0.1, 0.015]]), np.array([[0.0, 0.0, 2.0]]))
+    assert forces.sum() == pytest.approx(2.0)
+    (loaded,) = np.flatnonzero(forces)
+    assert LAYOUT.p_LT[loaded, 1] == pytest.approx(-0.1, abs=0.005)
+
+
+FACES = st.lists(
+    st.tuples(st.floats(-0.004, 0.004), st.floats(-0.4, 0.4), st.floats(1e-3, 5.0)),
+    min_size=1,
+    max_size=8,
+)
+
+
+@given(st.floats(-0.25, -0.02), st.sampled_from([-1.0, 1.0]), FACES)
+def test_a_narrow_patch_reads_its_resultant_at_its_centre_of_pressure(
+    along: float, side: float, faces: list[tuple[float, float, float]]
+) -> None:
+    offset, tilt, force = np.array(faces).T
+    p_L = np.column_stack([np.full(len(faces), side * 0.015), along + offset, 0.0 * offset])
+    f_L = force[:, None] * np.column_stack([side * np.cos(tilt), np.sin(tilt), 0.0 * tilt])
+    forces = press(2, p_L, f_L)
+    total = f_L.sum(axis=0)
+    assert forces.sum() == pytest.approx(np.linalg.norm(total))
+    (loaded,) = np.flatnonzero(forces)
+    centre = along + offset @ force / force.sum()
+    assert LAYOUT.n_L[loaded, 0] == side
+    assert abs(LAYOUT.p_LT[loaded, 1] - centre) <= 0.005 + 1e-9
+
+
+def test_a_wide_patch_spreads_over_the_taxels_under_it() -> None:
+    y = np.linspace(-0.20, -0.10, 201)
+    p_L = np.column_stack([np.full(201, 0.015), y, np.zeros(201)])
+    forces = press(2, p_L, np.tile([10.0 / 201.0, 0.0, 0.0], (201, 1)))
+    loaded = np.flatnonzero(forces)
+    assert forces.sum() == pytest.approx(10.0)
+    np.testing.assert_array_equal(LAYOUT.n_L[loaded, 0], 1.0)
+    span = LAYOUT.p_LT[loaded, 1]
+    assert len(loaded) in (10, 11)
+    assert span.min() == pytest.approx(-0.20, abs=0.005)
+    assert span.max() == pytest.approx(-0.10, abs=0.005)
+    # The pressure is even: a taxel in the middle takes 1 cm of 10 cm.
+    inner = forces[loaded][np.abs(span + 0.15) < 0.04]
+    np.testing.assert_allclose(inner, 1.0, rtol=0.06)
+    centre = forces @ LAYOUT.p_LT / forces.sum()
+    assert centre[1] == pytest.approx(-0.15, abs=0.003)
+
+
+def test_a_patch_around_a_cap_spreads_over_its_taxels() -> None:
+    angle = np.deg2rad(np.linspace(-80.0, 80.0, 81))
+    n_L = np.column_stack([np.sin(angle), -np.cos(angle), np.zeros(81)])
+    p_L = np.array([0.0, -0.273, 0.0]) + 0.015 * n_L
+    forces = press(2, p_L, n_L / 81.0)
+    loaded = np.flatnonzero(forces)
+    assert forces.sum() == pytest.approx(1.0)
+    assert len(loaded) == 5
+    assert np.all(LAYOUT.n_L[loaded, 1] < 0.0)
+
+
+def test_an_edge_that_presses_with_both_its_sides_reads_as_one_contact() -> None:
+    # The corner of a box on the side of a link: its two faces push at 40 and -50 degrees.
+    directions = np.deg2rad([40.0, -50.0])
+    f_L = 2.0 * np.column_stack([np.cos(directions), np.sin(directions), np.zeros(2)])
+    forces = press(2, np.array([[0.015, -0.101, 0.0], [0.015, -0.102, 0.0]]), f_L)
+    (loaded,) = np.flatnonzero(forces)
+    assert forces[loaded] == pytest.approx(2.0 * np.sqrt(2.0))
+    assert LAYOUT.n_L[loaded, 0] == 1.0
+    assert LAYOUT.p_LT[loaded, 1] == pytest.approx(-0.1015, abs=0.0051)
+
+
+@given(st.lists(st.tuples(LINK, st.floats(-0.15, -0.05), st.floats(0.1, 10.0)), max_size=6))
+def test_contacts_add_up_taxel_by_taxel(contacts: list[tuple[int, float, float]]) -> None:
+    patches = [
+        make_patch(
+            link,
+            place(link, np.array([[0.015, along, 0.0]])),
+            turn(link, np.array([[force, 0.0, 0.0]])),
+        )
+        for link, along, force in contacts
+    ]
+    together = calc_taxel_forces(LAYOUT, *POSES, patches)
+    apart = [calc_taxel_forces(LAYOUT, *POSES, [patch]) for patch in patches]
+    np.testing.assert_allclose(together, np.sum([np.zeros(188), *apart], axis=0), atol=1e-12)
+    assert together.sum() == pytest.approx(sum(force for _, _, force in contacts))
+
+
+def test_a_patch_without_pressure_reads_nothing() -> None:
+    forces = press(2, np.array([[0.015, -0.1, 0.0]]), np.zeros((1, 3)))
+    np.testing.assert_array_equal(forces, 0.0)
+
+
+@pytest.mark.filterwarnings("error")
+def test_faces_whose_forces_cancel_read_nothing() -> None:
+    f_L = np.array([[2.0, 0.0, 0.0], [-2.0, 0.0, 0.0]])
+    forces = press(2, np.array([[0.015, -0.1, 0.0]] * 2), f_L)
+    np.testing.assert_allclose(forces, 0.0, atol=1e-12)
+
+
+@given(ANGLE, ANGLE, ANGLE)
+def test_readings_do_not_depend_on_the_configuration(q1: float, q2: float, q3: float) -> None:
+    R_RL, p_RL = ARM.calc_pose(np.array([q1, q2, q3]))[:2]
+    p_L, f_L = np.array([0.015, -0.1234, 0.0]), np.array([2.0, 0.5, 0.0])
+    patch = make_patch(1, (p_RL[1] + R_RL[1] @ p_L)[None], (R_RL[1] @ f_L)[None])
+    np.testing.assert_allclose(
+        calc_taxel_forces(LAYOUT, R_RL, p_RL, [patch]), press(1, p_L[None], f_L[None]), atol=1e-9
+    )

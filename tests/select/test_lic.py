@@ -1,0 +1,435 @@
+"""LIC's selection for both robots: against dense scans, random samples and known optima."""
+
+import numpy as np
+import pytest
+from support.pr2_reference import link_poses
+from support.select_surfaces import Bumps, random_bumps, random_model
+from support.starts import APERTURES, ARM, LINE, aperture_starts, assert_feasible, dense_scan
+
+from lic_drake.errors import RequestError
+from lic_drake.estimate.features import PLANAR_LIC1, FeatureMap, features_of
+from lic_drake.reach.scenario import load_scenario
+from lic_drake.reach.start import Start, Starts
+from lic_drake.select.lbfgsb import LbfgsbSelector
+from lic_drake.select.lic import LicSelector
+from lic_drake.select.objective import SuccessModel
+from lic_drake.select.situation import FailedReach, Selection, Situation
+from lic_drake.starts import BoardStarts, LineStarts, board_starts
+
+GOAL = np.array([0.6, 0.1, 0.0])
+FIRST = Situation(p_WG=GOAL, starts=LINE)
+SECOND_MODEL = features_of("cylinder-clutter").second
+assert SECOND_MODEL is not None
+KINDS = pytest.mark.parametrize("kind", [LicSelector, LbfgsbSelector])
+
+
+def lic(surface: Bumps, kind: type[LicSelector] = LicSelector) -> LicSelector:
+    return kind(SuccessModel(estimator=surface, features=PLANAR_LIC1))
+
+
+def value_of(selector: LicSelector, situation: Situation, chosen: Selection) -> float:
+    """LIC-1's estimate for a choice, from its estimator alone."""
+    x0, b0 = chosen.start.x0, chosen.start.b0
+    goal = situation.p_WG[:2] - b0[:2]
+    return float(selector.first.estimator.values(np.array([[*goal, x0[1] - b0[1], x0[2]]]))[0])
+
+
+def best_of_dense_scan(selector: LicSelector, situation: Situation) -> float:
+    assert isinstance(situation.starts, LineStarts)
+    scan = dense_scan(situation.starts)
+    return float(selector.objective(situation).values(scan.take(situation.allowed(scan))).max())
+
+
+def failed_at(
+    x0: np.ndarray, final: tuple[float, float] = (0.45, 0.05), b0: np.ndarray | None = None
+) -> FailedReach:
+    """A failure that began at x0 and ended with the hand at `final`."""
+    known = FailedReach.from_start(Start(x0, np.zeros(3) if b0 is None else b0))
+    names = ("final_x", "final_y", "final_phi", "final_vx", "final_vy")
+    shown = dict(zip(names, (*final, 0.3, 0.01, -0.02), strict=True))
+    return FailedReach(start=known.start, shown={**known.shown, **shown})
+
+
+# A fixed base in the plane
+
+
+def test_peak_inside_the_feasible_set_is_found_exactly() -> None:
+    peak = np.array([0.013, 1.0])
+    chosen = lic(Bumps(peak[None], np.array([0.9]), np.array([0.2, 0.6]))).select(FIRST)
+    np.testing.assert_allclose(chosen.start.x0[1:], peak, atol=1e-3)
+    assert chosen.probability == pytest.approx(0.9, abs=1e-5)
+
+
+def test_peak_that_the_arm_cannot_take_gives_the_best_start_at_the_joint_limits() -> None:
+    # A hand at y = 0.3 m cannot point straight ahead: phi must be at least 52 degrees there.
+    selector = lic(Bumps(np.array([[0.3, 0.0]]), np.array([0.9]), np.array([0.1, 0.4])))
+    chosen = selector.select(FIRST)
+    assert chosen.probability is not None and chosen.start.q is not None
+    assert chosen.probability >= 0.99 * best_of_dense_scan(selector, FIRST)
+    margin = np.min(np.minimum(chosen.start.q - ARM.q_min, ARM.q_max - chosen.start.q))
+    assert 0.0 <= margin + 1e-9 < np.deg2rad(2.0)
+
+
+@KINDS
+@pytest.mark.parametrize("seed", range(6))
+def test_selection_matches_a_dense_scan_and_beats_every_grid_start(
+    kind: type[LicSelector], seed: int
+) -> None:
+    selector = lic(random_bumps(seed), kind)
+    chosen = selector.select(FIRST)
+    value = value_of(selector, FIRST, chosen)
+    assert value >= selector.objective(FIRST).values(LINE.grid).max() - 1e-8
+    # L-BFGS-B does not follow the joint limits.
+    share = 0.99 if kind is LicSelector else 0.95
+    assert value >= share * best_of_dense_scan(selector, FIRST)
+    assert chosen.probability == pytest.approx(min(value, 1.0), abs=1e-12)
+    assert_feasible(LINE, chosen.start)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_second_selection_keeps_away_from_the_first_and_is_the_best_there(seed: int) -> None:
+    selector = lic(random_bumps(seed))
+    first = selector.select(FIRST)
+    failed = (FailedReach.from_start(first.start),)
+    situation = Situation(p_WG=GOAL, starts=LINE, failed=failed)
+    second = selector.select(situation)
+    assert abs(second.start.x0[1] - first.start.x0[1]) > 0.1
+    value = value_of(selector, situation, second)
+    assert value >= 0.99 * best_of_dense_scan(selector, situation)
+
+
+def test_where_failures_leave_no_start_at_a_distance_a_nearer_one_is_chosen() -> None:
+    failed = tuple(
+        FailedReach.from_start(Start(np.array([0.335, y, 1.0]))) for y in np.arange(-0.34, 0.4, 0.1)
+    )
+    selector = lic(random_bumps(0))
+    situation = Situation(p_WG=GOAL, starts=LINE, failed=failed)
+    chosen = selector.select(situation)
+    distances = [abs(chosen.start.x0[1] - reach.start.x0[1]) for reach in failed]
+    assert 0.05 < min(distances) < 0.1
+    value = value_of(selector, situation, chosen)
+    assert value >= 0.99 * best_of_dense_scan(selector, situation)
+
+
+def test_a_start_just_beside_what_failed_is_none_to_improve() -> None:
+    # The grid's last start, y = -0.4 m, is one retry distance and a hair from the failed one.
+    failed = FailedReach.from_start(Start(np.array([0.335, -0.3 + 1e-7, 0.0])))
+    situation = Situation(p_WG=GOAL, starts=LINE, failed=(failed,))
+    peak = random_bumps(0)
+    peak.centres[:] = [-0.4, -0.3]
+    chosen = lic(peak).select(situation)
+    assert abs(chosen.start.x0[1] + 0.3) > 0.1
+
+
+def test_selection_without_a_start_left_is_refused() -> None:
+    every = LINE.grid.join(LINE.lattice(np.zeros(0)))
+    failed = tuple(FailedReach.from_start(start) for start in every)
+    with pytest.raises(RequestError, match="no start is left"):
+        lic(random_bumps(0)).select(Situation(p_WG=GOAL, starts=LINE, failed=failed))
+
+
+# Apertures and a mobile base in the plane
+
+
+@KINDS
+@pytest.mark.parametrize("seed", range(4))
+def test_at_apertures_the_choice_matches_a_dense_scan_over_aperture_angle_and_base(
+    kind: type[LicSelector], seed: int
+) -> None:
+    selector = kind(random_model(seed))
+    situation = Situation(p_WG=np.array([0.65, 0.2 - 0.1 * seed, 0.0]), starts=APERTURES)
+    chosen = selector.select(situation)
+    assert_feasible(APERTURES, chosen.start)
+    value = value_of(selector, situation, chosen)
+    assert value >= 0.99 * best_of_dense_scan(selector, situation)
+    assert chosen.probability == pytest.approx(min(value, 1.0), abs=1e-12)
+
+
+def test_a_track_that_ends_early_bounds_the_base() -> None:
+    # The surface wants the hand 0.3 m to the right of the base, which the track's end forbids.
+    starts = aperture_starts([-0.35, 0.05, 0.52])
+    assert starts.track is not None
+    starts.track.y_max_m = 0.1
+    selector = lic(Bumps(np.array([[-0.3, 0.2]]), np.array([0.9]), np.array([0.2, 0.5])))
+    situation = Situation(p_WG=GOAL, starts=starts)
+    chosen = selector.select(situation)
+    assert_feasible(starts, chosen.start)
+    assert value_of(selector, situation, chosen) >= 0.99 * best_of_dense_scan(selector, situation)
+
+
+def test_after_a_failure_lic1_takes_the_best_of_the_other_apertures() -> None:
+    selector = LicSelector(random_model(3))
+    first = selector.select(Situation(p_WG=GOAL, starts=APERTURES))
+    failed = (FailedReach.from_start(first.start),)
+    situation = Situation(p_WG=GOAL, starts=APERTURES, failed=failed)
+    second = selector.select(situation)
+    assert second.start.x0[1] != first.start.x0[1]
+    assert_feasible(APERTURES, second.start)
+    assert value_of(selector, situation, second) >= 0.99 * best_of_dense_scan(selector, situation)
+
+
+@pytest.mark.parametrize("offset", [(0.0, 0.7), (-0.4, -1.3), (3.0, 20.0)])
+@pytest.mark.parametrize("after_failure", [False, True])
+def test_a_translated_situation_has_the_translated_answer_and_the_same_estimate(
+    offset: tuple[float, float], after_failure: bool
+) -> None:
+    # Equation (3): only where things are relative to each other counts.
+    second = random_model(8, SECOND_MODEL)
+    selector = LicSelector(random_model(7), second if after_failure else None)
+
+    def choose(dx: float, dy: float) -> Selection:
+        x0, b0 = np.array([0.335 + dx, 0.05 + dy, 0.2]), np.array([dx, dy, 0.0])
+        failed = failed_at(x0, (0.5 + dx, 0.1 + dy), b0)
+        return selector.select(
+            Situation(
+                p_WG=GOAL + [dx, dy, 0.0],
+                starts=aperture_starts([-0.35, 0.05, 0.52], (dx, dy)),
+                failed=(failed,) if after_failure else (),
+            )
+        )
+
+    here, there = choose(0.0, 0.0), choose(*offset)
+    assert there.probability == pytest.approx(here.probability, abs=1e-6)
+    np.testing.assert_allclose(there.start.x0 - [*offset, 0.0], here.start.x0, atol=2e-3)
+    np.testing.assert_allclose(there.start.b0 - [*offset, 0.0], here.start.b0, atol=2e-3)
+
+
+# LIC-2
+
+
+@pytest.mark.parametrize("starts", [LINE, APERTURES], ids=["line", "apertures"])
+def test_lic2_takes_the_best_of_all_starts_after_what_the_failure_showed(
+    starts: LineStarts,
+) -> None:
+    selector = LicSelector(random_model(1), random_model(2, SECOND_MODEL))
+    assert selector.second is not None
+    answers = []
+    for final in ((0.4, -0.2), (0.7, 0.3)):
+        failed = failed_at(starts.grid.x0[9], final, starts.grid.b0[9])
+        situation = Situation(p_WG=GOAL, starts=starts, failed=(failed,))
+        chosen = selector.select(situation)
+        assert_feasible(starts, chosen.start)
+        base = chosen.start.b0[:2]
+        x = [
+            *(GOAL[:2] - base),
+            *(failed.start.x0[1] - base[1], failed.start.x0[2]),
+            *(np.array(final) - base),
+            *(chosen.start.x0[1] - base[1], chosen.start.x0[2]),
+        ]
+        value = float(selector.second.estimator.values(np.array([x]))[0])
+        assert chosen.probability == pytest.approx(min(value, 1.0), abs=1e-9)
+        assert value >= 0.99 * selector.objective(situation).values(dense_scan(starts)).max()
+        answers.append(chosen)
+    # What it saw made a difference.
+    assert answers[0].probability != answers[1].probability
+
+
+def test_lic2_may_start_where_the_first_reach_did() -> None:
+    # Its estimate is highest just there, whatever it observes.
+    peak = np.array([[0.05, 0.9]])
+    surface = Bumps(peak, np.array([0.9]), np.array([0.1, 0.3]))
+    second = SuccessModel(estimator=surface, features=SECOND_MODEL)
+    selector = LicSelector(random_model(1), second)
+    situation = Situation(p_WG=GOAL, starts=LINE, failed=(failed_at(np.array([0.335, 0.05, 0.9])),))
+    np.testing.assert_allclose(selector.select(situation).start.x0[1:], peak[0], atol=2e-3)
+
+
+def test_a_failure_that_never_began_leaves_lic1_away_from_it() -> None:
+    selector = LicSelector(random_model(1), random_model(2, SECOND_MODEL))
+    alone = LicSelector(random_model(1))
+    first = alone.select(FIRST)
+    failed = failed_at(first.start.x0, (np.nan, np.nan))
+    situation = Situation(p_WG=GOAL, starts=LINE, failed=(failed,))
+    chosen = selector.select(situation)
+    assert abs(chosen.start.x0[1] - first.start.x0[1]) > 0.1
+    assert chosen.start == alone.select(situation).start
+    assert chosen.probability == alone.select(situation).probability
+
+
+def test_after_several_failures_the_choice_maximises_the_smallest_of_their_estimates() -> None:
+    second = random_model(4, SECOND_MODEL)
+    selector = LicSelector(random_model(1), second)
+    failed = (
+        failed_at(np.array([0.335, -0.2, 0.5]), (0.4, -0.2)),
+        failed_at(np.array([0.335, 0.2, 1.2]), (0.7, 0.3)),
+        failed_at(np.array([0.335, 0.0, 0.9]), (0.55, 0.0)),
+    )
+    chosen = selector.select(Situation(p_WG=GOAL, starts=LINE, failed=failed))
+
+    def smallest(some: Starts) -> np.ndarray:
+        estimates = []
+        for reach in failed:
+            seen = [*reach.start.x0[1:], reach.shown["final_x"], reach.shown["final_y"]]
+            X = np.column_stack([np.tile([*GOAL[:2], *seen], (len(some), 1)), some.x0[:, 1:]])
+            estimates.append(second.estimator.values(X))
+        return np.min(estimates, axis=0)
+
+    value = smallest(Starts.of(chosen.start))[0]
+    assert chosen.probability == pytest.approx(min(value, 1.0), abs=1e-12)
+    assert value >= 0.99 * smallest(dense_scan(LINE)).max()
+
+
+# A PR2 before a board
+
+BLOCKED = load_scenario("sphere-aperture-clutter", "{clutter: {num_blocked: 10}}")
+ROLLING = FeatureMap(goal=("goal_y", "goal_z"), start=("start_y", "start_z", "start_qx"))
+"""Features of a hand behind a board that may roll."""
+
+
+class Ridge(Bumps):
+    """Estimates that fall with the distance of the start from a place in the robot's frame."""
+
+    def __init__(self, scale: tuple[float, ...] = (0.0, 0.0, 3.0, 3.0, 0.3)) -> None:
+        self.scale = scale
+        self.top = np.array([0.0, 0.0, -0.33, 0.8, 0.3])
+
+    def _values(self, X: np.ndarray) -> np.ndarray:
+        return np.asarray(np.exp(-np.abs(X - self.top) @ np.array(self.scale)))
+
+    def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        value = float(self.values(x[None])[0])
+        return value, -value * np.array(self.scale) * np.sign(x - self.top)
+
+
+RIDGE = SuccessModel(estimator=Ridge(), features=ROLLING)
+
+
+def before_board(environment: int, *failed: FailedReach) -> Situation:
+    instance = BLOCKED.sample_instance("holdout", environment)
+    starts = board_starts(BLOCKED, instance, BLOCKED.task.stand)
+    return Situation(p_WG=BLOCKED.sample_goal("holdout", environment), starts=starts, failed=failed)
+
+
+@KINDS
+@pytest.mark.parametrize("environment", range(3))
+def test_a_pr2_points_into_an_open_aperture_and_no_start_of_the_grid_is_better(
+    kind: type[LicSelector], environment: int
+) -> None:
+    asked = before_board(environment)
+    selector = kind(RIDGE)
+    chosen = selector.select(asked)
+    x0, b0, q = chosen.start.x0, chosen.start.b0, chosen.start.q
+    assert isinstance(asked.starts, BoardStarts) and q is not None
+    # By kinematics that do not read the model.
+    X_WE = link_poses((b0[0], b0[1], 0.0), b0[2], q)[7]
+    np.testing.assert_allclose(X_WE[:3, 3], x0[:3], atol=1e-9)
+    np.testing.assert_allclose(X_WE[:3, 0], [1.0, 0.0, 0.0], atol=1e-9)
+    assert np.min(np.linalg.norm(asked.starts.p_WA - x0[:3], axis=1)) < 1e-9
+    assert not asked.starts.checker.touches(b0, q)
+    value = selector.objective(asked).values(Starts.of(chosen.start))[0]
+    assert value == pytest.approx(chosen.probability)
+    assert value >= selector.objective(asked).values(asked.starts.grid).max() - 1e-8
+
+
+def test_a_pr2s_selection_is_better_than_random_samples_and_gains_over_the_grid() -> None:
+    rng, gains = np.random.default_rng(1), []
+    for environment in range(3):
+        asked = before_board(environment)
+        selector, starts = LicSelector(RIDGE), asked.starts
+        chosen = selector.select(asked)
+        assert chosen.probability is not None
+        objective = selector.objective(asked)
+        for _ in range(100):
+            region = starts.regions[rng.integers(len(starts.regions))]
+            start = starts.nearest(
+                np.append(region.lower[:3], [1.0, 0.0, 0.0, 0.0]),
+                rng.uniform(region.b0_lower, region.b0_upper),
+            )
+            if start is not None:
+                assert chosen.probability > objective.values(Starts.of(start))[0] - 0.01
+        gains.append(chosen.probability - objective.values(starts.grid).max())
+    assert max(gains) > 0.02
+
+
+def test_a_peak_between_places_of_the_lattice_is_found() -> None:
+    """The lattice's best place is on a hill of 0.93; beside its places stands a peak of 1."""
+
+    class Peaks(Bumps):
+        def __init__(self) -> None:
+            pass
+
+        def _values(self, X: np.ndarray) -> np.ndarray:
+            hill = 0.93 - 2.0 * np.abs(X[:, 2:4] - [-0.24, 0.9]).sum(axis=1)
+            return np.maximum(hill, 1.0 - 8.0 * np.abs(X[:, 2:4] - [-0.3235, 0.851]).sum(axis=1))
+
+        def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+            return float(self.values(x[None])[0]), np.zeros(5)
+
+    model = SuccessModel(estimator=Peaks(), features=ROLLING)
+    chosen = LicSelector(model).select(before_board(3))
+    assert chosen.probability == pytest.approx(1.0, abs=0.03)
+
+
+def test_a_translated_board_has_a_translated_answer() -> None:
+    """Board, goal and the range of the base move 0.1 m to the left: so does the answer."""
+    text = "{{clutter: {{board_centre: [0.53, {0}, 0.89]}}, task: {{stand: {{y_min_m: {1},"
+    text += " y_max_m: {2}, training_y_m: [{1}]}}}}}}"
+    chosen = []
+    for shift in (0.0, 0.1):
+        scenario = load_scenario(
+            "sphere-aperture-clutter", text.format(-0.29 + shift, -0.2 + shift, shift)
+        )
+        instance = scenario.sample_instance("holdout", 0)
+        starts = board_starts(scenario, instance, scenario.task.stand)
+        asked = Situation(p_WG=np.array([0.84, -0.2 + shift, 0.9]), starts=starts)
+        chosen.append(LicSelector(RIDGE).select(asked))
+    here, there = (item.start for item in chosen)
+    np.testing.assert_allclose(there.x0 - here.x0, [0.0, 0.1, *np.zeros(5)], atol=2e-4)
+    np.testing.assert_allclose(there.b0 - here.b0, [0.0, 0.1, 0.0], atol=2e-4)
+    assert chosen[1].probability == pytest.approx(chosen[0].probability, abs=1e-4)
+
+
+def test_a_further_attempt_goes_through_another_aperture() -> None:
+    first = LicSelector(RIDGE).select(before_board(0))
+    failed = FailedReach.from_start(first.start)
+    second = LicSelector(RIDGE).select(before_board(0, failed))
+    assert np.linalg.norm(second.start.x0[:3] - first.start.x0[:3]) > 0.19
+
+
+def test_an_aperture_that_may_be_blocked_counts_less() -> None:
+    asked = before_board(1)
+    assert isinstance(asked.starts, BoardStarts)
+    sure = LicSelector(RIDGE).select(asked)
+    at = np.argmin(np.linalg.norm(asked.starts.p_WA - sure.start.x0[:3], axis=1))
+    chance = np.where(np.arange(len(asked.starts.p_WA)) == at, 0.1, 1.0)
+    starts = BoardStarts(
+        scenario=BLOCKED,
+        instance=asked.starts.instance,
+        stand=asked.starts.stand,
+        probability_open=chance,
+    )
+    other = LicSelector(RIDGE).select(Situation(p_WG=asked.p_WG, starts=starts))
+    assert np.linalg.norm(other.start.x0[:3] - sure.start.x0[:3]) > 0.19
+
+
+def test_lic_2_of_ones_own_knows_where_the_first_reach_began() -> None:
+    class Away(Bumps):
+        """Likes to begin far from where the first reach began."""
+
+        def __init__(self) -> None:
+            pass
+
+        def _values(self, X: np.ndarray) -> np.ndarray:
+            return np.asarray(np.linalg.norm(X[:, 4:6] - X[:, 2:4], axis=1))
+
+        def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+            apart = x[4:6] - x[2:4]
+            gradient = np.zeros(7)
+            gradient[4:6] = apart / np.linalg.norm(apart)
+            gradient[2:4] = -gradient[4:6]
+            return float(np.linalg.norm(apart)), gradient
+
+    features = FeatureMap(
+        goal=ROLLING.goal,
+        start=ROLLING.start,
+        observed=("first_start_y", "first_start_z"),
+    )
+    model = SuccessModel(estimator=Away(), features=features)
+    asked = before_board(1)
+    assert isinstance(asked.starts, BoardStarts)
+    x0 = np.array([*asked.starts.p_WA[0], 1.0, 0.0, 0.0, 0.0])
+    failed = FailedReach.from_start(Start(x0, np.array([0.0, 0.1, 0.2])))
+    chosen = LicSelector(RIDGE, model).select(before_board(1, failed))
+    reachable = np.unique(asked.starts.grid.x0[:, :3], axis=0)
+    farthest = reachable[np.argmax(np.linalg.norm(reachable - x0[:3], axis=1))]
+    np.testing.assert_allclose(chosen.start.x0[:3], farthest)
