@@ -4,7 +4,7 @@ import gc
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from uuid import uuid4
@@ -199,7 +199,7 @@ def _first_rates(rows: Sequence[TrialRow]) -> str:
     return ", ".join(parts)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True)
 class _Plan:
     """What workers need, wherever they are; equal to nothing but itself and its copies.
 
@@ -211,9 +211,9 @@ class _Plan:
     """
 
     name: str
-    evaluation: Evaluation
-    scenario: Scenario
-    cameras: CamerasConfig | None
+    evaluation: Evaluation = field(compare=False)
+    scenario: Scenario = field(compare=False)
+    cameras: CamerasConfig | None = field(compare=False)
 
     @classmethod
     def of(cls, evaluation: Evaluation, scenario: Scenario) -> "_Plan":
@@ -228,12 +228,6 @@ class _Plan:
             scenario=scenario,
             cameras=load_cameras(evaluation.cameras) if evaluation.cameras else None,
         )
-
-    def __hash__(self) -> int:
-        return hash(self.name)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Plan) and self.name == other.name
 
 
 class _Strategies:
