@@ -16,7 +16,7 @@ from lic_drake.experience.runner import Progress, refuse_failed, simulate
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.experience.workers import LocalWorkers
 from lic_drake.reach.request import ReachRecord, ReachRequest
-from lic_drake.reach.rollout import run_reach
+from lic_drake.reach.session import run_reach
 
 RESULTS = Path("notebooks/results")
 """Folder of all records, seen from the root of a checkout, where scripts are run."""

@@ -7,7 +7,7 @@ another system's port, or an id object that a plant has returned.
 import gc
 import os
 import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,16 +19,13 @@ from support.worlds import box, cylinder, make_clutter
 
 from lic_drake.control.mpc import HapticMpc
 from lic_drake.evaluate.trial import random_requests
-from lic_drake.reach import environment as reach_environment
-from lic_drake.reach import rollout, simulation_pool
+from lic_drake.reach import environment
 from lic_drake.reach.diagram import ReachDiagram, make_reach_diagram
 from lic_drake.reach.environment import Environment
 from lic_drake.reach.request import ReachRequest
-from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import load_scenario
-from lic_drake.reach.simulation_pool import SimulationPool
-from lic_drake.reach.start import Start
-from lic_drake.show import recording
+from lic_drake.reach.session import ReachSession
+from lic_drake.reach.sleeping import waking
 from lic_drake.show.recording import Recording
 from lic_drake.starts import board_starts
 
@@ -38,7 +35,7 @@ pytestmark = pytest.mark.skipif(
 
 
 @pytest.fixture
-def built(monkeypatch: pytest.MonkeyPatch) -> Iterator[list["weakref.ref[Any]"]]:
+def built(monkeypatch: pytest.MonkeyPatch) -> list["weakref.ref[Any]"]:
     """Weak references to all diagrams, and their systems, that are built during a test."""
     references: list[weakref.ref[Any]] = []
 
@@ -48,17 +45,9 @@ def built(monkeypatch: pytest.MonkeyPatch) -> Iterator[list["weakref.ref[Any]"]]
         references.extend(weakref.ref(item) for item in (reach_diagram.diagram, *systems))
         return reach_diagram
 
-    forget()
-    for module in (reach_environment, recording, simulation_pool):
+    for module in (environment, waking):
         monkeypatch.setattr(module, "make_reach_diagram", make)
-    yield references
-    forget()
-
-
-def forget() -> None:
-    """Drops the environments and the simulations of this process."""
-    rollout._environments.clear()
-    rollout._pool = SimulationPool()
+    return references
 
 
 def alive(references: list["weakref.ref[Any]"]) -> list[str]:
@@ -69,61 +58,48 @@ def alive(references: list["weakref.ref[Any]"]) -> list[str]:
 ONE_DIAGRAM = ["controller", "plant", "reach", "scene_graph", "sensor", "standstill"]
 
 
-def test_environments_bases_and_histories_share_a_diagram(
-    built: list["weakref.ref[Any]"],
+@pytest.mark.parametrize("sleep", [True, False])
+def test_a_session_keeps_a_limited_number_of_diagrams_and_drops_them_all_when_it_is_cleared(
+    built: list["weakref.ref[Any]"], sleep: bool
 ) -> None:
-    request = reach_request(small_clutter(0.04))
-    for environment in range(5):
-        run_reach(replace(request, environment=environment))
-    run_reach(replace(request, start=Start(request.start.x0, np.array([0.0, 0.05, 0.0]))))
-    run_reach(request.then(request.start))
-    assert len(built) == len(ONE_DIAGRAM)
-    assert alive(built) == ONE_DIAGRAM
-    forget()
-    assert alive(built) == []
-
-
-def test_only_the_diagram_of_the_last_environment_stays_where_nothing_sleeps(
-    built: list["weakref.ref[Any]"],
-) -> None:
-    for environment in range(3):
-        run_reach(reach_request(small_clutter(0.04), environment=environment), sleep=False)
-    assert len(built) == 3 * len(ONE_DIAGRAM)
-    assert alive(built) == ONE_DIAGRAM
-
-
-def test_a_pool_keeps_a_limited_number_of_diagrams(
-    built: list["weakref.ref[Any]"], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(simulation_pool, "MAX_SIMULATIONS", 2)
-    for count in range(5):
-        scenario = load_scenario("cylinder-clutter", f"{{clutter: {{num_fixed: {count}}}}}")
-        run_reach(reach_request(replace(scenario, stop=free_space(0.04).stop)))
+    session = ReachSession(sleep)
+    session.diagrams.size = 2
+    gc.disable()  # The collector is not left to chance.
+    try:
+        for count in range(5):
+            scenario = load_scenario("cylinder-clutter", f"{{clutter: {{num_fixed: {count}}}}}")
+            session.run(reach_request(replace(scenario, stop=free_space(0.04).stop)))
+        left = sum(reference() is not None for reference in built)
+    finally:
+        gc.enable()
     assert len(built) == 5 * len(ONE_DIAGRAM)
-    assert len(alive(built)) <= 2 * len(ONE_DIAGRAM)
+    assert left <= 2 * len(ONE_DIAGRAM)
+    session.clear()
+    assert alive(built) == []
 
 
 def test_a_reach_in_contact_leaves_nothing(built: list["weakref.ref[Any]"]) -> None:
     scenario = free_space(1.0)
     wall = make_clutter(box(0.4, 0.0, (0.04, 0.8, 0.2)))
-    environment = Environment(scenario, wall)
+    within = Environment(scenario, wall)
     x0 = reach_request(scenario).start.x0
-    _, trace, _ = environment.reach(np.array([0.7, 0.0, 0.0]), x0)
+    _, trace, _ = within.reach(np.array([0.7, 0.0, 0.0]), x0)
     assert max(trace.contacts) > 0
-    del environment
+    del within
     assert alive(built) == []
     assert len(built) == len(ONE_DIAGRAM)
 
 
 def test_reaches_of_the_pr2_leave_nothing(built: list["weakref.ref[Any]"]) -> None:
     scenario = load_scenario("sphere-aperture-clutter", "{stop: {timeout_s: 0.2}}")
-    for environment in range(2):
-        instance = scenario.sample_instance("training", environment)
+    session = ReachSession()
+    for index in range(2):
+        instance = scenario.sample_instance("training", index)
         starts = board_starts(scenario, instance).grid
-        p_WG = scenario.goals("training", environment)[4]
-        run_reach(ReachRequest(scenario, "training", environment, p_WG, starts[7]))
-    assert len(built) >= 2 * len(ONE_DIAGRAM)
-    forget()
+        p_WG = scenario.goals("training", index)[4]
+        session.run(ReachRequest(scenario, "training", index, p_WG, starts[7]))
+    assert len(built) >= len(ONE_DIAGRAM)
+    session.clear()
     assert alive(built) == []
 
 
@@ -139,9 +115,10 @@ def test_failures_and_invalid_starts_leave_nothing(
         reach_request(small_clutter(0.1), phi_deg=-90.0, environment=1),
         reach_request(small_clutter(0.1), (5.0, 0.0), environment=2),
     ]
-    outcomes = [run_reach(request).outcome for request in requests]
+    session = ReachSession()
+    outcomes = [session.run(request).outcome for request in requests]
     assert outcomes == ["diverged", "invalid_start", "unreachable"]
-    forget()
+    session.clear()
     assert alive(built) == []
 
 
@@ -151,17 +128,6 @@ def test_a_recording_is_freed() -> None:
     del recorded
     gc.collect()
     assert diagram() is None
-
-
-def test_the_collector_is_not_left_to_chance(built: list["weakref.ref[Any]"]) -> None:
-    gc.disable()
-    try:
-        for environment in range(3):
-            run_reach(reach_request(small_clutter(0.04), environment=environment), sleep=False)
-        left = [item for reference in built if (item := reference()) is not None]
-        assert len(left) == len(ONE_DIAGRAM)
-    finally:
-        gc.enable()
 
 
 def resident_mb() -> float:
@@ -184,7 +150,8 @@ def growth_mb(reach: Callable[[int], Any], first: int, count: int) -> float:
 def test_five_thousand_reaches_need_no_more_memory_than_five_hundred() -> None:
     scenario = load_scenario("cylinder-clutter", "{stop: {timeout_s: 0.4}}")
     requests = random_requests(scenario, "training", 250, 20)
-    growth = growth_mb(lambda i: run_reach(requests[i]), 500, 5000)
+    session = ReachSession()
+    growth = growth_mb(lambda i: session.run(requests[i]), 500, 5000)
     print(f"grew by {growth:.1f} MB")
     assert growth < 30.0
 
@@ -195,6 +162,7 @@ def test_three_hundred_reaches_of_the_pr2_need_no_more_memory_than_a_hundred() -
         "sphere-aperture-clutter", "{clutter: {num_blocked: 10}, stop: {timeout_s: 2.0}}"
     )
     requests = random_requests(scenario, "training", 60, 5)
-    growth = growth_mb(lambda i: run_reach(requests[i]), 100, 300)
+    session = ReachSession()
+    growth = growth_mb(lambda i: session.run(requests[i]), 100, 300)
     print(f"grew by {growth:.1f} MB")
     assert growth < 15.0

@@ -9,13 +9,18 @@ import resource
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import nbformat
+import numpy as np
 import pytest
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
 from nbclient import NotebookClient
 from support.browser import assert_shows_a_scene, visit
 from support.trial_rows import fill_records
 
+from lic_drake.clutter.registry import category_names
 from lic_drake.evaluate.paper import REMARKS, TABLES
 
 NOTEBOOKS = Path(__file__).resolve().parent.parent / "notebooks"
@@ -126,6 +131,30 @@ def test_notebooks_run_from_the_committed_records(name: str) -> None:
     if missing:
         pytest.skip(f"notebooks/results/{missing[0]} is not there yet")
     run(name, NOTEBOOKS)
+
+
+def test_the_categories_are_drawn_by_name_with_their_own_objects_and_starts() -> None:
+    figures: list[Figure] = []
+    cells: dict[str, Any] = {"Figure": Figure}
+    for text in code(read("categories")):
+        exec(text.replace("%matplotlib inline\n", ""), cells)
+        figures.append(cells.get("figure", Figure()))
+    scenarios, overview, front = cells["scenarios"], figures[1], figures[2]
+    assert tuple(scenarios) == category_names()
+    titles = [ax.get_title() for ax in overview.axes]
+    assert titles == [f"{name} {k}" for k in range(2) for name in scenarios]
+    shown = [(ax, *ax.get_title().split()) for ax in overview.axes]
+    shown += [(ax, ax.get_title(), "0") for ax in front.axes]
+    for ax, name, environment in shown:
+        instance = scenarios[name].sample_instance("evaluation", int(environment))
+        discs = [patch for patch in ax.patches if isinstance(patch, Circle)]
+        round_ones = sum(shape in ("cylinder", "sphere") for shape in instance.shape)
+        assert len(discs) == round_ones + 1, "objects and the goal"
+        marked = [line for line in ax.lines if line.get_gid() == "hand starts"]
+        if instance.p_WA is not None and ax in overview.axes:  # In apertures of that environment.
+            off = instance.p_WA[:, 1] - marked[0].get_ydata()[:, np.newaxis]
+            assert np.abs(off).min(axis=1).max() < 1e-5
+    assert sum(isinstance(patch, Circle) for patch in front.axes[0].patches) == 40 + 1
 
 
 def wall_and_cpu_seconds() -> tuple[float, float]:

@@ -99,8 +99,8 @@ def run(args: argparse.Namespace) -> int:
     """Runs the subcommand and returns the exit code."""
     from lic_drake.cli.asked_reach import asked_reach
     from lic_drake.errors import RequestError
-    from lic_drake.reach.rollout import run_reach
     from lic_drake.reach.scenario import load_scenario
+    from lic_drake.reach.session import run_reach
 
     request = asked_reach(load_scenario(args.scenario, args.set), args)
     for path in (args.diagram, args.record):
@@ -150,7 +150,7 @@ def _draw(request: "ReachRequest", path: Path) -> None:
 
 
 def _record(request: "ReachRequest", path: Path) -> None:
-    from lic_drake.reach.rollout import instance_of, simulate_request
+    from lic_drake.reach.session import instance_of, simulate_request
     from lic_drake.show.recording import Recording
 
     recording = Recording(request.scenario, instance_of(request))

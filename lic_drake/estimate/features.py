@@ -119,8 +119,7 @@ class FeatureMap:
     def goal_matrix(self) -> Vector:
         """The matrix, shape (k, d), that takes x to the goal in R."""
         # What replaces the goal by its difference from the start also brings it back.
-        matrix: Vector = self._matrix[: len(self.goal)]
-        return matrix
+        return self._matrix[: len(self.goal)]
 
     def rows(self, columns: Mapping[str, NDArray[Any]]) -> ExperienceRows:
         """Returns the rows of a library.
@@ -202,10 +201,7 @@ class FeatureMap:
                 f"the first reach shows no {self.observed[np.argmin(np.isfinite(seen))]}, as if it"
                 " never began; choose the second start as a first one"
             )
-        observed: Vector = (
-            np.array(seen) - np.asarray(b0, dtype=float) @ _base_part(self.observed).T
-        )
-        return observed
+        return np.array(seen) - np.asarray(b0, dtype=float) @ _base_part(self.observed).T
 
     def gradient_by_x0(self, gradient: Vector) -> Vector:
         """Returns a gradient by x0, shape (3,) or in space (7,), from one by x, shape (d,).
@@ -222,15 +218,13 @@ class FeatureMap:
         Goal, first reach and start are fixed in W, so that positions in R change by minus the
         displacement of the base.
         """
-        by_base: Vector = -(_base_part(self.columns).T @ self._by_columns(gradient))
-        return by_base
+        return -(_base_part(self.columns).T @ self._by_columns(gradient))
 
     def _features(self, values: Vector) -> Vector:
         """Returns x from the columns' values in R, both of shape (..., d)."""
         if not self.relative:
             return values
-        features: Vector = np.round(values @ self._matrix.T, _DECIMALS)
-        return features
+        return np.round(values @ self._matrix.T, _DECIMALS)
 
     def _by_columns(self, gradient: Vector) -> Vector:
         """Returns the gradient by the columns from one by x, both of shape (d,)."""

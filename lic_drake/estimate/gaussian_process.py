@@ -122,10 +122,7 @@ class Posterior:
     def mean(self, X: Vector) -> Vector:
         """Returns the posterior mean for queries X, shape (n, d): shape (n,)."""
         correlation = l1_correlation(self.X, X, self.hyperparameters.theta)
-        mean: Vector = self.prior_mean + self.alpha @ (
-            self.hyperparameters.signal_variance * correlation
-        )
-        return mean
+        return self.prior_mean + self.alpha @ (self.hyperparameters.signal_variance * correlation)
 
     def mean_and_gradient(self, x: Vector) -> tuple[float, Vector]:
         """Returns the posterior mean at x, shape (d,), and its gradient, shape (d,)."""
@@ -166,14 +163,12 @@ def l1_correlation(A: Vector, B: Vector, theta: Vector) -> Vector:
     Returns:
         Shape (n, m).
     """
-    correlation: Vector = np.exp(-cdist(A * theta, B * theta, "cityblock"))
-    return correlation
+    return np.exp(-cdist(A * theta, B * theta, "cityblock"))
 
 
 def coordinate_distances(X: Vector) -> Vector:
     """Returns |x_i - x_j| of each feature, shape (d, n, n)."""
-    distances: Vector = np.abs(X.T[:, :, None] - X.T[:, None, :])
-    return distances
+    return np.abs(X.T[:, :, None] - X.T[:, None, :])
 
 
 def negative_log_likelihood(

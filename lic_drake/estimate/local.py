@@ -54,8 +54,7 @@ class Neighbourhoods:
 
     def in_scales(self, X: Vector) -> Vector:
         """Returns the situations of rows, shape (..., d), in length scales, shape (..., k)."""
-        scaled: Vector = X[..., self.situation] / self.length_scale[self.situation]
-        return scaled
+        return X[..., self.situation] / self.length_scale[self.situation]
 
     def nearest(self, scaled: Vector, size: int, among: BoolVector | None = None) -> IntVector:
         """Returns the indices of the rows nearest to a situation, shape (size,) or fewer.
@@ -69,8 +68,7 @@ class Neighbourhoods:
         distance = np.sum((self.in_scales(self.X[rows]) - scaled) ** 2, axis=1)
         if len(rows) <= size:
             return rows
-        found: IntVector = rows[np.argpartition(distance, size)[:size]]
-        return found
+        return rows[np.argpartition(distance, size)[:size]]
 
 
 class LocalEstimator(SuccessEstimator):
@@ -143,8 +141,7 @@ class LocalEstimator(SuccessEstimator):
 
     def _cell(self, X: Vector) -> Vector:
         """Returns the centres of the queries' cells, shape (..., k), in length scales."""
-        centres: Vector = _CELL * np.round(self._near.in_scales(X) / _CELL) + 0.0
-        return centres
+        return _CELL * np.round(self._near.in_scales(X) / _CELL) + 0.0
 
     def _cells_of(self, X: Vector) -> Iterator[tuple[Vector, IntVector]]:
         """Yields each cell that holds any queries, with their indices."""

@@ -113,8 +113,7 @@ def gaussian_weights(distance: Vector) -> Vector:
         distance: Distances d in bandwidths, shape (..., k), the nearest first.
     """
     nearest = distance[..., :1]
-    weights: Vector = np.exp(-0.5 * (distance**2 - nearest**2))
-    return weights
+    return np.exp(-0.5 * (distance**2 - nearest**2))
 
 
 def select_bandwidths(rows: AveragedRows, y: Vector, weight: Vector, fold: IntVector) -> Vector:

@@ -161,8 +161,7 @@ def group_folds(groups: ArrayLike, max_folds: int) -> IntVector:
         )
     # Shuffled, lest the order of a grid decide which rows share a fold.
     rank = make_generator("training", "folds").permutation(len(distinct))
-    fold: IntVector = rank[index] % min(max_folds, len(distinct))
-    return fold
+    return rank[index] % min(max_folds, len(distinct))
 
 
 def selection_folds(groups: ArrayLike | None, num_rows: int, max_folds: int = 5) -> IntVector:

@@ -22,8 +22,8 @@ from lic_drake.experience.workers import ThisProcess, Workers
 from lic_drake.perception.config import CamerasConfig, load_cameras
 from lic_drake.perception.observer import Observer
 from lic_drake.reach.request import ReachRecord, ReachRequest
-from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario, load_scenario, parse_scenario
+from lic_drake.reach.session import run_reach
 from lic_drake.seeds import make_generator
 from lic_drake.select.baselines import RandomSelector
 from lic_drake.select.registry import (

@@ -12,8 +12,8 @@ from typing import Any
 
 import lic_drake
 from lic_drake.evaluate.trial import random_requests
-from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.session import run_reach
 
 PARTS = {
     "control/tactile": "sensor",
@@ -24,8 +24,6 @@ PARTS = {
     "reach/diagram": "build",
     "reach/simulation": "build",
     "reach/sleeping": "build",
-    "reach/stem_waking": "build",
-    "reach/waking": "build",
     "reach/": "rest",
 }
 """Part of the time by the start of a module's path in the package; the first that fits counts."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from lic_drake.reach.request import ReachRecord, ReachRequest
-from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.session import run_reach
 from lic_drake.seeds import make_generator
 from lic_drake.select.registry import Selector
 from lic_drake.select.situation import FailedReach, Selection, Situation

@@ -153,7 +153,7 @@ class TrialTable:
         return self._trials[variant, method]
 
     def success(self, method: str, attempts: int, variant: str = "") -> NDArray[np.bool_]:
-        """Tells which trials reach the goal within their first attempts, shape (n,).
+        """Returns which trials reach the goal within their first attempts, shape (n,).
 
         Args:
             method: Strategy.

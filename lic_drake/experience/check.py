@@ -13,7 +13,7 @@ from lic_drake.experience.runner import ReachFunction
 from lic_drake.experience.schema import read_header, read_table
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.request import SIMULATION, ReachRecord, ReachRequest
-from lic_drake.reach.rollout import run_reach
+from lic_drake.reach.session import run_reach
 
 NOT_COMPARED = ("wall_time_s", "lic_drake_version", "drake_version", "weight")
 """What a repetition may change without being another reach."""

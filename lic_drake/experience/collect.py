@@ -22,8 +22,8 @@ from lic_drake.experience.schema import scenario_text
 from lic_drake.experience.store import WHOLE, ExperienceLibrary, Share
 from lic_drake.experience.workers import Workers
 from lic_drake.reach.request import ReachRequest
-from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario, parse_scenario
+from lic_drake.reach.session import run_reach
 from lic_drake.reach.start import Starts
 from lic_drake.seeds import STREAMS
 from lic_drake.starts import training_starts

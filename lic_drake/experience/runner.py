@@ -19,8 +19,8 @@ from lic_drake.experience.schema import read_table, to_records
 from lic_drake.experience.store import WHOLE, ExperienceLibrary, Share
 from lic_drake.experience.workers import ThisProcess, Workers
 from lic_drake.reach.request import ReachRecord, ReachRequest
-from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.session import run_reach
 
 ReachFunction = Callable[[ReachRequest], ReachRecord]
 """Simulates a request; a top-level function, so that worker processes can import it."""

@@ -71,8 +71,7 @@ class TableHeader:
 
 def scenario_text(scenario: Scenario) -> str:
     """Returns every value of a scenario as YAML; `parse_scenario` reads it back."""
-    text: str = yaml.safe_dump(to_dict(scenario), sort_keys=False)
-    return text
+    return yaml.safe_dump(to_dict(scenario), sort_keys=False)
 
 
 def make_header(scenario: Scenario) -> TableHeader:

@@ -3,14 +3,15 @@
 from dataclasses import dataclass
 
 import numpy as np
+from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.control.mpc_controller import HapticMpcController
-from lic_drake.control.surface_taxels import make_taxels
 from lic_drake.control.tactile_sensor import TactileSensor
+from lic_drake.control.taxels import make_taxels
 from lic_drake.reach.scenario import Scenario
-from lic_drake.scene.scene import Scene, add_scene
+from lic_drake.scene.scene import Scene, SceneConfig, add_scene, make_simulator
 from lic_drake.types import Vector
 
 
@@ -25,6 +26,7 @@ class ReachDiagram:
 
     diagram: Diagram
     scene: Scene
+    config: SceneConfig
     sensor: TactileSensor
     controller: HapticMpcController
 
@@ -37,6 +39,16 @@ class ReachDiagram:
         )
         self.controller.set_equilibrium(self.controller.GetMyMutableContextFromRoot(context), q)
         self.diagram.GetInputPort("goal").FixValue(context, p_RG)
+
+    def make_simulator(self, context: Context | None = None) -> Simulator:
+        """Returns a simulator with the scenario's integrator, see `make_simulator`.
+
+        A plain `Simulator(diagram)` would integrate a continuous plant by Runge-Kutta instead.
+
+        Args:
+            context: A context of the diagram; by default a new one.
+        """
+        return make_simulator(self.diagram, self.config, context)
 
 
 def make_reach_diagram(
@@ -89,6 +101,7 @@ def make_reach_diagram(
     return ReachDiagram(
         diagram=diagram,
         scene=scene,
+        config=scenario.scene,
         sensor=sensor,
         controller=controller,
     )

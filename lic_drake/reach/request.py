@@ -171,8 +171,7 @@ def _read_after(record: "ReachRecord", angles: int) -> list[tuple[Start, ...]]:
 
 def _in_space(unit: str, doc: str) -> float:
     """Returns a column that is 0 in the plane."""
-    column: float = field(default=0.0, metadata={"unit": unit, "doc": doc})
-    return column
+    return field(default=0.0, metadata={"unit": unit, "doc": doc})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -300,7 +299,7 @@ def check_goal(scenario: Scenario, p_RG: Vector) -> None:
 
 
 def is_within_reach(scenario: Scenario, p_RG: Vector) -> bool:
-    """Tells whether the straight arm could come near enough to a goal to succeed.
+    """Returns whether the straight arm could come near enough to a goal to succeed.
 
     Args:
         scenario: Robot and success distance.

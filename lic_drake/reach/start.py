@@ -62,8 +62,7 @@ class Start:
     @property
     def x0_R(self) -> Vector:
         """The hand pose in R, the frame that moves with b0; shape as x0."""
-        x0_R: Vector = _shifted(self.x0[None], self.b0[None])[0]
-        return x0_R
+        return _shifted(self.x0[None], self.b0[None])[0]
 
     def __eq__(self, other: object) -> bool:
         """Returns whether another start has the same numbers."""

@@ -99,8 +99,7 @@ class ReachTrace:
         span = times[last] - times[first]
         if span <= 0.0:
             return np.zeros(3)
-        velocity: Vector = (self.p_WE[last] - self.p_WE[first]) / span
-        return velocity
+        return (self.p_WE[last] - self.p_WE[first]) / span
 
 
 class ReachResult(NamedTuple):

@@ -241,8 +241,7 @@ class Pr2Kinematics(Kinematics):
         _, tool = _turn(z, forearm, wrist)
         wrist_to_tool = self.lengths.tool * (tool @ _X_R)
         elbow_to_tool = wrist_to_tool + self.lengths.forearm * (forearm @ _X_R)
-        cost: Vector = 1.0 / (alpha * np.abs(wrist_to_tool) + beta * np.abs(elbow_to_tool))
-        return cost
+        return 1.0 / (alpha * np.abs(wrist_to_tool) + beta * np.abs(elbow_to_tool))
 
     def _look_from_shoulder(self, p_RE: Vector, u_R: Vector, pan: Vector) -> _Heading:
         """Returns wrist and direction in the frame of the pan link, moved to the shoulder."""
@@ -286,8 +285,7 @@ def _turn(u: Vector, v: Vector, angle: Vector) -> tuple[Vector, Vector]:
 
 def _wrap(angle: Vector) -> Vector:
     """Returns angles wrapped to [-pi, pi), radians."""
-    wrapped: Vector = np.mod(angle + np.pi, 2.0 * np.pi) - np.pi
-    return wrapped
+    return np.mod(angle + np.pi, 2.0 * np.pi) - np.pi
 
 
 def _turn_axes(u: _Axis, v: _Axis, angle: float) -> tuple[_Axis, _Axis]:

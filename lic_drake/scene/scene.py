@@ -21,7 +21,8 @@ from pydrake.multibody.tree import (
     SpatialInertia,
     UnitInertia,
 )
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
 from lic_drake.clutter.instance import ClutterInstance
@@ -30,7 +31,7 @@ from lic_drake.errors import ScenarioError
 from lic_drake.robots.arm import Arm
 from lic_drake.scene.contact import ContactConfig, object_properties, skin_properties
 from lic_drake.scene.looks import object_color
-from lic_drake.scene.movables import add_floating_body, add_sliding_body
+from lic_drake.scene.movables import add_movable
 from lic_drake.scene.stems import add_stems
 from lic_drake.types import Vector
 
@@ -39,6 +40,11 @@ TIME_STEP_RANGE_S = (1e-5, 0.1)
 
 CONTACT_APPROXIMATIONS = ("sap", "similar", "lagged")
 """Drake's names for the ways in which a discrete plant solves contact."""
+
+
+STEP_SLACK = 1e-9
+"""Relative slack on the longest step. Without it, round-off added a fifth, near-zero step to every
+other control period of four steps."""
 
 
 @dataclass(kw_only=True)
@@ -147,7 +153,16 @@ def add_scene(
     for i in range(instance.num_objects):
         name = f"object{i}"
         if instance.movable[i]:
-            body = _add_movable(plant, clutter, name, instance, i, config)
+            body = add_movable(
+                plant,
+                clutter,
+                name,
+                instance.mass[i],
+                instance.p_WO[i, : instance.num_axes],
+                friction_N=config.ground_friction_N,
+                creep_m_per_s=config.ground_creep_m_per_s,
+                drag_N_s_per_m=config.drag_N_s_per_m,
+            )
             X_BO = RigidTransform(RollPitchYaw(0.0, 0.0, instance.yaw[i]), np.zeros(3))
         else:
             body, X_BO = surroundings, pose_of(instance, i)
@@ -188,6 +203,32 @@ def add_scene(
     )
 
 
+def make_simulator(
+    diagram: Diagram, config: SceneConfig, context: Context | None = None
+) -> Simulator:
+    """Returns a simulator of a diagram with a scene, with the integrator that its plant needs.
+
+    Args:
+        diagram: The diagram.
+        config: Says whether the plant is discrete or integrated by CENIC.
+        context: A context of the diagram; by default a new one.
+    """
+    context = diagram.CreateDefaultContext() if context is None else context
+    simulator = Simulator(diagram, context)
+    if config.time_step_s == 0.0:
+        longest_s = config.cenic_max_step_s * (1.0 + STEP_SLACK)
+        simulator_config = SimulatorConfig(
+            integration_scheme="cenic",
+            accuracy=config.cenic_accuracy,
+            max_step_size=longest_s,
+            start_time=context.get_time(),
+        )
+        ApplySimulatorConfig(simulator_config, simulator)
+        # Not a tenth of it: nearly all steps are as long as they may be.
+        simulator.get_mutable_integrator().request_initial_step_size_target(longest_s)
+    return simulator
+
+
 def _wear_skin(
     plant: MultibodyPlant,
     scene_graph: SceneGraph,
@@ -223,8 +264,8 @@ def _find_body(
 def _add_surroundings(plant: MultibodyPlant) -> RigidBody:
     """Adds a body for what is fixed.
 
-    Not the world's: Drake 1.58 finds no contacts with geometry of the world that `furnish` has put
-    elsewhere, since it is still looked for where it was.
+    Not the world's: Drake 1.58 finds no contacts with geometry of the world that `ChangeShape` has
+    moved (`lic_drake.reach.sleeping`), since it is still looked for where it was.
     """
     body = plant.AddRigidBody(
         "surroundings",
@@ -233,23 +274,6 @@ def _add_surroundings(plant: MultibodyPlant) -> RigidBody:
     )
     plant.WeldFrames(plant.world_frame(), body.body_frame())
     return body
-
-
-def _add_movable(
-    plant: MultibodyPlant,
-    clutter: ModelInstanceIndex,
-    name: str,
-    instance: ClutterInstance,
-    i: int,
-    config: SceneConfig,
-) -> RigidBody:
-    """Adds the body of the movable object i."""
-    mass, p_WO = instance.mass[i], instance.p_WO[i]
-    if instance.num_axes == 3:
-        return add_floating_body(plant, clutter, name, mass, p_WO, config.drag_N_s_per_m)
-    return add_sliding_body(
-        plant, clutter, name, mass, p_WO, config.ground_friction_N, config.ground_creep_m_per_s
-    )
 
 
 def pose_of(instance: ClutterInstance, i: int) -> RigidTransform:

@@ -14,8 +14,8 @@ import lic_drake
 from lic_drake.evaluate.paper import label
 from lic_drake.evaluate.trial import Attempt, run_trial
 from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.reach.rollout import simulate_request
 from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.session import simulate_request
 from lic_drake.select.registry import make_selector
 from lic_drake.show.figures import ShownTrial, describe_start, is_reachable
 from lic_drake.show.page import UNPACK, make_page, pack, picture

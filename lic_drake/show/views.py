@@ -9,8 +9,8 @@ from matplotlib.patches import Circle, Patch, Polygon, Rectangle
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.evaluate.trial import Attempt
-from lic_drake.reach.rollout import simulate_request
 from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.session import simulate_request
 from lic_drake.reach.start import Starts
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.robots.arm import Arm

@@ -123,8 +123,7 @@ class Choices(NamedTuple):
     def share(self, score: Vector) -> Vector:
         """Returns the success of each choice of the best score, shape (n,); ties share."""
         best = score == score.max(axis=1, keepdims=True)
-        chosen: Vector = np.sum(best * self.success, axis=1) / best.sum(axis=1)
-        return chosen
+        return np.sum(best * self.success, axis=1) / best.sum(axis=1)
 
     def mean(self, values: Vector) -> tuple[float, float]:
         """Returns the weighted mean in percent and its standard error over environments."""

@@ -72,8 +72,7 @@ class HeldOut:
 def goal_of_each(columns: Columns) -> NDArray[np.intp]:
     """Returns the number of each reach's goal (goal_y, goal_z), shape (n,)."""
     goals = np.round(np.column_stack([columns["goal_y"], columns["goal_z"]]), 6)
-    goal: NDArray[np.intp] = np.unique(goals, axis=0, return_inverse=True)[1].ravel()
-    return goal
+    return np.unique(goals, axis=0, return_inverse=True)[1].ravel()
 
 
 def hold_out_goals(name: str, columns: Columns) -> HeldOut:
@@ -128,8 +127,7 @@ def _gap(estimator: SuccessEstimator, seen: Vector, asked: Vector) -> Vector:
     if not isinstance(estimator, NearestNeighbours):
         return np.full(len(asked), np.nan)
     tree = cKDTree(seen / estimator.bandwidth_)
-    distance: Vector = tree.query(asked / estimator.bandwidth_)[0]
-    return distance
+    return tree.query(asked / estimator.bandwidth_)[0]
 
 
 def first_table(results: dict[str, HeldOut], f: Vector) -> Table:

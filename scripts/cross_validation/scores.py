@@ -54,8 +54,7 @@ class HeldOutPredictions:
         """
         gain = _log_losses(self.constant, self.rows.y) - _log_losses(self.probability, self.rows.y)
         _, index = np.unique(self.rows.groups, return_inverse=True)
-        by_environment: Vector = np.bincount(index, gain) / np.bincount(index)
-        return by_environment
+        return np.bincount(index, gain) / np.bincount(index)
 
 
 def hold_out_environments(
@@ -171,14 +170,12 @@ def selection_success(score: Vector, rows: ExperienceRows, situation: slice) -> 
     chosen = score == best[choice]
     success = np.bincount(choice[chosen], rows.y[chosen]) / np.bincount(choice[chosen])
     _, environment = np.unique(choices[:, 0], return_inverse=True)
-    share: Vector = np.bincount(environment, success) / np.bincount(environment)
-    return share
+    return np.bincount(environment, success) / np.bincount(environment)
 
 
 def _log_losses(probability: Vector, f: Vector) -> Vector:
     p = np.clip(probability, MIN_PROBABILITY, 1.0 - MIN_PROBABILITY)
-    losses: Vector = -np.where(f > 0.5, np.log(p), np.log1p(-p))
-    return losses
+    return -np.where(f > 0.5, np.log(p), np.log1p(-p))
 
 
 def _standard_error(values: Vector) -> float:

@@ -4,9 +4,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from lic_drake.clutter.instance import ClutterInstance
-from lic_drake.reach.environment import Environment, simulate
+from lic_drake.reach.environment import Environment
 from lic_drake.reach.request import ReachRequest
 from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.simulation import simulate
 from lic_drake.reach.trace import ReachResult
 from scripts.mujoco.mujoco_scene import MujocoConfig
 from scripts.mujoco.mujoco_simulation import MujocoSimulation

@@ -7,7 +7,7 @@ from itertools import groupby
 
 import numpy as np
 
-from lic_drake.control.surface_taxels import make_taxels
+from lic_drake.control.taxels import make_taxels
 from lic_drake.evaluate.trial import random_requests
 from lic_drake.experience.workers import LocalWorkers
 from lic_drake.reach.request import ReachRequest, is_within_reach

@@ -8,9 +8,10 @@ import numpy as np
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.control.mpc_controller import HapticMpcController
-from lic_drake.control.surface_taxels import make_taxels
-from lic_drake.control.tactile import ContactPatch, calc_taxel_forces
+from lic_drake.control.tactile_sensor import ContactPatch, calc_taxel_forces
+from lic_drake.control.taxels import make_taxels
 from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.trace import SceneState
 from lic_drake.types import Vector
 from scripts.mujoco.mujoco_scene import MujocoConfig, make_mujoco_scene
 
@@ -27,19 +28,19 @@ class MujocoSimulation:
         self._layout = make_taxels(self._arm, scenario.scene.taxels_per_m)
         self._controller = HapticMpcController(self._arm, self._layout, scenario.mpc)
 
-    def begin(self, q: Vector, p_WG: Vector) -> None:
+    def begin(self, q: Vector, p_RG: Vector) -> None:
         """Puts the arm at rest at q and every object where the environment has it.
 
         Args:
             q: Joint angles, shape (m,), radians.
-            p_WG: Goal, shape (3,), metres.
+            p_RG: Goal, shape (3,), metres.
         """
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[self._joints] = q
         self.data.ctrl[:] = q
         self._context = self._controller.CreateDefaultContext()
         self._controller.set_equilibrium(self._context, q)
-        self._controller.GetInputPort("goal").FixValue(self._context, p_WG)
+        self._controller.GetInputPort("goal").FixValue(self._context, p_RG)
         self.sense()
 
     def is_in_collision(self) -> bool:
@@ -64,7 +65,12 @@ class MujocoSimulation:
             self.sense()
         return self._taxel_force
 
-    def look_around(self, q: Vector) -> None:
+    def state(self) -> SceneState:
+        """Returns the state of the arm and of the movable objects."""
+        q, v, m = self.data.qpos, self.data.qvel, self._joints.stop
+        return SceneState(q[:m].copy(), v[:m].copy(), q[m:].reshape(-1, 2), v[m:].reshape(-1, 2))
+
+    def wake_near(self, q: Vector) -> None:
         """Does nothing: MuJoCo wakes objects by itself."""
 
     def step(self, steps: int) -> None:

@@ -13,8 +13,8 @@ from lic_drake.experience.schema import scenario_text
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 from lic_drake.reach.request import ReachRequest
-from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario, parse_scenario
+from lic_drake.reach.session import run_reach
 from lic_drake.reach.start import POSE_AXES, Start
 from lic_drake.seeds import make_generator
 from lic_drake.select.baselines import RandomSelector

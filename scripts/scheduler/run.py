@@ -119,12 +119,18 @@ def measure_all(tasks: int) -> tuple[dict[int, Cost], dict[str, Cost]]:
 
 def report(idle: dict[int, Cost], costs: dict[str, Cost], reach_s: float) -> str:
     """Returns the costs as Markdown, and how many workers keep scheduler and collector busy."""
-    one = costs[ONE]
     # Up to ten workers send two heartbeats a second each.
     heartbeat_s = (idle[10].scheduler_s - idle[2].scheduler_s) / (IDLE_S * 2 * (10 - 2))
     share = MAX_HEARTBEATS * heartbeat_s
-    scheduler_s = one.scheduler_s / one.tasks / (1 - share)
-    busiest_s = max(scheduler_s, one.collector_s / one.tasks)
+    rows = []
+    for n, cost in ((1, costs[ONE]), (PER_TASK, costs[ALL])):
+        scheduler_s = cost.scheduler_s / (1 - share) / cost.tasks
+        collector_s = cost.collector_s / cost.tasks
+        workers = n * reach_s / max(scheduler_s, collector_s)
+        rows.append(
+            f"| {n} | {n * reach_s:.3g} | {1e3 * scheduler_s:.1f} | {1e3 * collector_s:.1f}"
+            f" | {workers:,.0f} |"
+        )
     record_s = 2 * costs[ALL].wall_s / costs[ALL].tasks / PER_TASK
     lines = [
         "# Scaling",
@@ -145,14 +151,12 @@ def report(idle: dict[int, Cost], costs: dict[str, Cost], reach_s: float) -> str
         + ", ".join(f"{1e3 * c.scheduler_s / c.tasks:.0f} ms/s ({n})" for n, c in idle.items())
         + ".",
         "",
-        f"Computed, not tried: heartbeats take up to {share:.0%} of the scheduler's core; what is"
-        f" left serves a task every {1e3 * scheduler_s:.1f} ms, the collector one every"
-        f" {1e3 * one.collector_s / one.tasks:.1f} ms. With reaches of {reach_s:.2g} s both keep up"
-        " with",
+        f"Computed, not tried: heartbeats take up to {share:.0%} of the scheduler's core. With"
+        f" reaches of {reach_s:.2g} s both keep up with",
         "",
-        "| reaches a task | task, s | workers |",
-        "|---|---|---|",
-        *(f"| {n} | {n * reach_s:.3g} | {n * reach_s / busiest_s:,.0f} |" for n in (1, PER_TASK)),
+        "| reaches a task | task, s | scheduler, ms/task | collector, ms/task | workers |",
+        "|---|---|---|---|---|",
+        *rows,
     ]
     return "\n".join(lines) + "\n"
 

@@ -203,8 +203,7 @@ def _error(results: Sequence[Count]) -> Vector:
     """Returns the distances from rates down and up to their intervals' ends, (2, n), percent."""
     rate = np.array([result.rate for result in results])
     ends = np.array([result.interval() for result in results]).T
-    error: Vector = 100.0 * np.abs(ends - rate)
-    return error
+    return 100.0 * np.abs(ends - rate)
 
 
 def _in_order(methods: Sequence[str]) -> list[str]:

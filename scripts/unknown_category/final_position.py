@@ -109,5 +109,4 @@ class FinalPositions:
         log_kernel = -0.5 * cdist(p_RE, self.p_RE, "sqeuclidean") / variance
         log_kernel -= np.log(2.0 * np.pi * variance)
         density: Vector = logsumexp(log_weight + log_kernel, axis=1)
-        mixed: Vector = np.logaddexp(np.log1p(-OUTLIERS) + density, np.log(OUTLIERS))
-        return mixed
+        return np.logaddexp(np.log1p(-OUTLIERS) + density, np.log(OUTLIERS))

@@ -19,8 +19,8 @@ from lic_drake.experience.schema import scenario_text
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 from lic_drake.reach.request import ReachRecord, ReachRequest
-from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario, parse_scenario
+from lic_drake.reach.session import run_reach
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.registry import Selector, make_selector
 from lic_drake.select.situation import FailedReach, Situation

@@ -10,8 +10,8 @@ import pytest
 
 from lic_drake.cli.main import main
 from lic_drake.reach.request import OUTCOMES, ReachRecord
-from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import load_scenario
+from lic_drake.reach.session import run_reach
 
 SMALL = "{clutter: {num_movable: 2, num_fixed: 2}, stop: {timeout_s: 0.4}}"
 LIC_REACH = ["reach", "--set", SMALL]
@@ -160,7 +160,7 @@ def test_a_reach_that_fails_in_the_simulator_is_reported_not_raised(
     def diverge(request: Any) -> ReachRecord:
         return dataclasses.replace(run_reach(request), outcome="diverged", detail="solver failed")
 
-    monkeypatch.setattr("lic_drake.reach.rollout.run_reach", diverge)
+    monkeypatch.setattr("lic_drake.reach.session.run_reach", diverge)
     assert main(LIC_REACH) == 0
     assert capsys.readouterr().out.startswith("diverged after 0.40 s")
 

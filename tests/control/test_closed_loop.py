@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from pydrake.systems.analysis import Simulator
 from support.kinematics import only
 from support.reaches import start_context
 from support.worlds import ARM, LAYOUT, cylinder, make_clutter
@@ -39,7 +38,7 @@ def run(
     scenario = parse_scenario(SCENARIO, overrides)
     reach = make_reach_diagram(scenario, clutter)
     context = start_context(reach, q, p_WG)
-    simulator = Simulator(reach.diagram, context)
+    simulator = reach.make_simulator(context)
     samples = []
     for i in range(round(time * scenario.mpc.rate_hz) + 1):
         simulator.AdvanceTo(i * scenario.mpc.period_s)
@@ -56,11 +55,9 @@ def run(
     )
 
 
-# From the start line into the goal area, from the right, the middle and the left.
+# From the start line into the goal area, from the right and from the left.
 FREE_REACHES = [
     ((0.335, -0.4, 0.0), (0.7, -0.2)),
-    ((0.335, 0.0, 60.0), (0.7, 0.0)),
-    ((0.335, 0.2, 60.0), (0.5, -0.1)),
     ((0.335, 0.3, 90.0), (0.45, 0.35)),
 ]
 

@@ -75,8 +75,8 @@ def joint_torques(world: World, forces: np.ndarray) -> np.ndarray:
 
 # Sides of all links and both caps of the last one: link 3's first side is taxels 124..150, the
 # other 151..177, the caps 178..187.
-@pytest.mark.parametrize("taxel", [25, 58, 101, 126, 144, 171, 180])
-@pytest.mark.parametrize("force", [1.0, 5.0])
+@pytest.mark.parametrize("taxel", [25, 58, 144, 180])
+@pytest.mark.parametrize("force", [5.0])
 def test_a_pressed_cylinder_reads_its_force_on_its_taxel_and_bends_the_arm_by_statics(
     taxel: int, force: float
 ) -> None:
@@ -91,9 +91,7 @@ def test_a_pressed_cylinder_reads_its_force_on_its_taxel_and_bends_the_arm_by_st
     np.testing.assert_allclose(deflection, torques, rtol=0.02, atol=2e-3 * force)
 
 
-@pytest.mark.parametrize(
-    ("skin_mesh", "object_mesh"), [(0.01, 0.01), (0.005, 0.004), (0.01, 0.004), (0.003, 0.002)]
-)
+@pytest.mark.parametrize(("skin_mesh", "object_mesh"), [(0.01, 0.01), (0.003, 0.002)])
 @pytest.mark.parametrize("modulus", [1e7, 1e8])
 def test_the_reading_depends_neither_on_the_contact_meshes_nor_on_the_skins_modulus(
     modulus: float, skin_mesh: float, object_mesh: float
@@ -141,7 +139,7 @@ def test_a_wall_along_the_arm_loads_many_taxels_with_its_whole_force() -> None:
     np.testing.assert_array_equal(LAYOUT.n_L[loaded, 0], 1.0)
 
 
-@pytest.mark.parametrize("turn_deg", [10.0, 30.0, 45.0])
+@pytest.mark.parametrize("turn_deg", [10.0, 45.0])
 def test_the_corner_of_a_box_reads_its_force_once_and_near_the_corner(turn_deg: float) -> None:
     R_RL, p_RL = ARM.calc_pose(BENT)[:2]
     normal, along = R_RL[2, :, 0], -R_RL[2, :, 1]

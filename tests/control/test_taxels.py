@@ -2,13 +2,24 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydrake.geometry import QueryObject
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+from pydrake.systems.framework import DiagramBuilder
 
-from lic_drake.control.taxels import CAP_ANGLES_DEG, planar_taxels
+from lic_drake.control.taxels import (
+    CAP_ANGLES_DEG,
+    INSIDE_M,
+    is_inside,
+    make_taxels,
+    planar_taxels,
+    surface_taxels,
+)
 from lic_drake.robots.planar import planar_arm
+from lic_drake.robots.pr2 import Q_HOME, pr2_arm
 from lic_drake.robots.skin import SkinShape
 
 ARM = planar_arm()
-LAYOUT = planar_taxels(ARM.skin)
+LAYOUT = make_taxels(ARM, 100.0)
 
 
 def capsule(radius: float, length: float, angle: float, p_LC: tuple[float, float]) -> SkinShape:
@@ -85,12 +96,6 @@ def test_taxels_of_any_capsule_lie_on_its_surface_with_outward_unit_normals(
     assert abs(0.5 * count - length * per_metre) <= 1.0 + 1e-9
 
 
-def test_links_keep_the_order_of_the_skin() -> None:
-    skin = (capsule(0.01, 0.1, 0.0, (0.0, 0.0)), capsule(0.01, 0.2, 1.0, (0.0, 0.0)))
-    layout = planar_taxels(skin, 100.0)
-    np.testing.assert_array_equal(layout.link, [0] * 30 + [1] * 50)
-
-
 @given(st.integers(0, 2), st.tuples(st.floats(-0.05, 0.05), st.floats(-0.4, 0.1)))
 def test_the_taxels_of_a_link_rank_by_their_distance_from_a_point(
     link: int, point: tuple[float, float]
@@ -105,3 +110,82 @@ def test_the_taxels_of_a_link_rank_by_their_distance_from_a_point(
     )
     both = mine.compare_distances(np.array([np.zeros(3), p_LQ]))
     np.testing.assert_allclose(both[1], compared, atol=1e-15)
+
+
+# In space
+
+PR2 = pr2_arm()
+SKIN = make_taxels(PR2, 50.0)
+
+
+def alone(kind: str, size: tuple[float, ...]) -> SkinShape:
+    turned = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    shape = {"link": "a", "kind": kind, "size": size, "R_LS": turned, "p_LS": np.ones(3)}
+    return SkinShape(**shape)  # type: ignore[arg-type]
+
+
+def test_taxels_lie_on_the_links_surface_with_normals_out_of_it() -> None:
+    builder = DiagramBuilder()
+    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 1e-3)
+    pr2 = PR2.add_to_plant(plant)
+    plant.Finalize()
+    diagram = builder.Build()
+    root = diagram.CreateDefaultContext()
+    plant.SetPositions(plant.GetMyMutableContextFromRoot(root), pr2, Q_HOME)
+    query: QueryObject = scene_graph.get_query_output_port().Eval(
+        scene_graph.GetMyContextFromRoot(root)
+    )
+    links = [plant.GetBodyByName(name) for name in PR2.link_names]
+    own = [set(plant.GetCollisionGeometriesForBody(body)) for body in links]
+    poses = [body.EvalPoseInWorld(plant.GetMyContextFromRoot(root)) for body in links]
+    for i in range(0, SKIN.num_taxels, 3):
+        link = SKIN.link[i]
+        p_WT = poses[link] @ SKIN.p_LT[i]
+        n_W = poses[link].rotation() @ SKIN.n_L[i]
+        near = [
+            item for item in query.ComputeSignedDistanceToPoint(p_WT, 0.5) if item.id_G in own[link]
+        ]
+        assert min(item.distance for item in near) > -2.0 * INSIDE_M
+        touching = [item for item in near if abs(item.distance) < 1e-9]
+        assert touching
+        assert any(item.grad_W @ n_W > 1.0 - 1e-6 for item in touching)
+
+
+@pytest.mark.parametrize(
+    ("kind", "size", "area"),
+    [
+        ("box", (0.2, 0.1, 0.06), 2.0 * (0.2 * 0.1 + 0.1 * 0.06 + 0.2 * 0.06)),
+        ("cylinder", (0.08, 0.3), 2.0 * np.pi * 0.08 * (0.08 + 0.3)),
+        ("capsule", (0.08, 0.3), 2.0 * np.pi * 0.08 * (2.0 * 0.08 + 0.3)),
+    ],
+)
+@pytest.mark.parametrize("per_metre", [50.0, 100.0])
+def test_the_density_is_as_asked_for(
+    kind: str, size: tuple[float, ...], area: float, per_metre: float
+) -> None:
+    layout = surface_taxels((alone(kind, size),), ("a",), per_metre)
+    assert layout.num_taxels / area == pytest.approx(per_metre**2, rel=0.05)
+    # Closed surface, equal areas: normals and moments of normals cancel.
+    np.testing.assert_allclose(layout.n_L.mean(axis=0), 0.0, atol=1e-12)
+    np.testing.assert_allclose(layout.p_LT.mean(axis=0), 1.0, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(layout.n_L, axis=1), 1.0)
+
+
+def test_a_box_has_rows_at_equal_distances_and_half_of_that_to_the_edges() -> None:
+    layout = surface_taxels((alone("box", (0.03, 0.05, 0.02)),), ("a",), 100.0)
+    assert layout.num_taxels == 2 * (3 * 5 + 5 * 2 + 3 * 2)
+    # Sx, Sy and Sz lie along Ly, Lz and Lx.
+    top = layout.p_LT[layout.n_L[:, 0] > 0.5] - 1.0
+    np.testing.assert_allclose(top[:, 0], 0.01)
+    np.testing.assert_allclose(np.unique(np.round(top[:, 1], 9)), [-0.01, 0.0, 0.01], atol=1e-9)
+    np.testing.assert_allclose(
+        np.unique(np.round(top[:, 2], 9)), [-0.02, -0.01, 0.0, 0.01, 0.02], atol=1e-9
+    )
+
+
+def test_what_another_shape_of_the_link_covers_has_no_taxel() -> None:
+    box, post = alone("box", (0.1, 0.1, 0.1)), alone("cylinder", (0.02, 0.2))
+    layout = surface_taxels((box, post), ("a",), 100.0)
+    apart = [surface_taxels((shape,), ("a",), 100.0) for shape in (box, post)]
+    assert layout.num_taxels < sum(part.num_taxels for part in apart)
+    assert not np.any(is_inside(box, layout.p_LT) | is_inside(post, layout.p_LT))

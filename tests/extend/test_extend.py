@@ -16,8 +16,8 @@ from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.estimate.registry import make_estimator
 from lic_drake.experience.collect import CollectionRequest
 from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import load_scenario
+from lic_drake.reach.session import run_reach
 from lic_drake.robots.planar import planar_arm
 from lic_drake.robots.registry import get_robot
 

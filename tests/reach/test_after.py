@@ -1,8 +1,8 @@
 """Reaches that find the environment as others before them left it."""
 
-from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import fields, replace
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -12,11 +12,12 @@ from support.fake_reach import comparable
 from support.reaches import assert_never_began, reach_request, small_clutter
 
 from lic_drake.experience.schema import make_header, read_table, to_records, to_table, write_table
-from lic_drake.reach import rollout as dut
+from lic_drake.reach import session as dut
 from lic_drake.reach.environment import Environment
+from lic_drake.reach.record import make_record
 from lic_drake.reach.request import ReachRecord, ReachRequest
-from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.session import ReachSession, run_reach
 from lic_drake.reach.start import Start
 
 SCENARIO = small_clutter(2.5)
@@ -26,11 +27,7 @@ SECOND = FIRST.then(FIRST.start)
 THIRD = SECOND.then(Start(np.array([0.335, 0.1, np.deg2rad(60.0)]), np.array([0.0, 0.1, 0.0])))
 
 
-@pytest.fixture(autouse=True)
-def fresh_process() -> Iterator[None]:
-    forget()
-    yield
-    forget()
+pytestmark = pytest.mark.usefixtures("session")
 
 
 def from_base(y_m: float, scenario: Scenario) -> ReachRequest:
@@ -41,8 +38,7 @@ def from_base(y_m: float, scenario: Scenario) -> ReachRequest:
 
 def forget() -> None:
     """Makes this process as if it had simulated nothing."""
-    dut._environments.clear()
-    dut._ends.clear()
+    dut.default_session(True).clear()
 
 
 def alone(request: ReachRequest) -> ReachRecord:
@@ -62,11 +58,11 @@ def by_hand(requests: list[ReachRequest]) -> list[ReachRecord]:
     instance, records = drawn, []
     for request in requests:
         base = request.start.b0
-        environment = Environment(SCENARIO, instance, b0=base)
+        environment = Environment(SCENARIO, instance, dut.default_session(True).sleep, base)
         result = environment.reach(request.goal, request.start.x0)
         assert result.trace.p_WO is not None
         instance = drawn.with_objects_at(result.trace.p_WO)
-        records.append(dut.make_record(request, result, 0.0))
+        records.append(make_record(request, result, 0.0))
     return records
 
 
@@ -103,47 +99,24 @@ def test_a_second_reach_does_not_depend_on_what_ran_before_in_the_process() -> N
         assert comparable([run_reach(r) for r in (SECOND, THIRD)]) == comparable(expected)
 
 
-def test_a_second_reach_does_not_depend_on_an_earlier_one_without_sleep() -> None:
-    expected = alone(THIRD)
-    forget()
-    for request in (FIRST, SECOND, THIRD):
-        run_reach(request, sleep=False)
-    assert comparable([run_reach(THIRD)]) == comparable([expected])
-
-
-def test_chains_are_the_same_in_another_process() -> None:
+def test_chains_are_the_same_in_another_process(sleep: bool) -> None:
     chain = [THIRD, FIRST, SECOND]
     expected = [alone(request) for request in chain]
     with ProcessPoolExecutor(1, mp_context=get_context("forkserver")) as pool:
-        elsewhere = list(pool.map(run_reach, chain))
+        elsewhere = list(pool.map(partial(run_reach, sleep=sleep), chain))
     assert comparable(elsewhere) == comparable(expected)
 
 
-def test_many_bases_and_histories_of_an_environment_do_not_mix(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(dut, "MAX_ENVIRONMENTS", 2)
-    monkeypatch.setattr(dut, "MAX_ENDS", 1)
+def test_many_bases_and_histories_of_an_environment_do_not_mix(session: ReachSession) -> None:
+    session.environments.size, session.ends.size = 2, 1
     shorter = small_clutter(0.4)
     chain = [replace(request, scenario=shorter) for request in (FIRST, SECOND, THIRD)]
     chain += [from_base(0.02 * k, shorter) for k in range(4)]
-    expected = [alone(request) for request in chain]
-    forget()
+    expected = [ReachSession(session.sleep).run(request) for request in chain]
     again = [run_reach(request) for request in [*chain, *reversed(chain)]]
     assert comparable(again[: len(chain)]) == comparable(expected)
     assert comparable(again[len(chain) :]) == comparable(expected[::-1])
-    assert len(dut._environments) <= 2
-
-
-def test_only_a_few_environments_are_kept() -> None:
-    shorter = small_clutter(0.04)
-    for k in range(12):
-        run_reach(from_base(0.01 * k, shorter))
-        assert 1 <= len(dut._environments) <= dut.MAX_ENVIRONMENTS
-    kept = dut.environment_of(from_base(0.01 * 11, shorter))
-    assert kept in dut._environments.values()
-    run_reach(replace(FIRST, scenario=shorter, environment=1))
-    assert len(dut._environments) == 1
+    assert len(session.environments) <= 2
 
 
 @pytest.mark.parametrize("phi_deg", [-90.0, 90.0])

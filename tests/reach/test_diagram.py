@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 from pydrake.multibody.tree import JointIndex
-from pydrake.systems.analysis import Simulator
 from support.reaches import start_angles, start_context
 from support.worlds import box, cylinder, make_clutter
 
@@ -67,7 +66,11 @@ def test_every_system_has_a_name_of_its_own(reach_diagram: ReachDiagram) -> None
 def test_all_systems_run(reach_diagram: ReachDiagram) -> None:
     # An input that was left unconnected would raise in the first steps.
     context = start_context(reach_diagram, start_angles(SCENARIO), P_WG)
-    Simulator(reach_diagram.diagram, context).AdvanceTo(0.1)
+    simulator = reach_diagram.make_simulator(context)
+    # As the project's: Drake's own would be Runge-Kutta with other steps.
+    assert simulator.get_integrator().get_target_accuracy() == SCENARIO.scene.cenic_accuracy
+    assert simulator.get_integrator().get_maximum_step_size() == pytest.approx(0.01)
+    simulator.AdvanceTo(0.1)
     for port in ("arm_state", "clutter_state", "taxel_force", "desired_state"):
         assert np.all(np.isfinite(reach_diagram.diagram.GetOutputPort(port).Eval(context)))
 

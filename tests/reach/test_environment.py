@@ -7,8 +7,8 @@ from support.worlds import box, cylinder, make_clutter
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.reach.environment import Environment
+from lic_drake.reach.record import make_record
 from lic_drake.reach.request import ReachRequest
-from lic_drake.reach.rollout import make_record
 from lic_drake.reach.scenario import Scenario, load_scenario
 from lic_drake.reach.start import Start
 from lic_drake.reach.trace import ReachResult
@@ -28,9 +28,10 @@ def reach_moved(
     p_WG: np.ndarray,
     x0: np.ndarray,
     offset: np.ndarray,
+    sleep: bool,
 ) -> ReachResult:
     """A reach with everything, the base too, moved by an offset."""
-    environment = Environment(scenario, instance.translated(offset), b0=offset)
+    environment = Environment(scenario, instance.translated(offset), sleep, offset)
     return environment.reach(p_WG + offset, x0 + offset, keep_states=True)
 
 
@@ -45,15 +46,15 @@ REACHES = [
 @pytest.mark.parametrize(("environment", "goal", "start"), REACHES)
 @pytest.mark.parametrize("offset", [[0.0, 0.5, 0.0], [-2.0, 0.25, 0.0]])
 def test_a_reach_is_the_same_wherever_everything_together_is(
-    environment: int, goal: list[float], start: list[float], offset: list[float]
+    environment: int, goal: list[float], start: list[float], offset: list[float], sleep: bool
 ) -> None:
     scenario, by = small_clutter(2.5), np.array(offset)
     drawn = scenario.sample_instance("training", environment)
     instance = drawn.with_objects_at(rounded(drawn.p_WO[drawn.movable, :2]))
     instance.p_WO[~instance.movable] = rounded(instance.p_WO[~instance.movable])
     p_WG, x0 = rounded(np.array(goal)), np.array([*rounded(np.array(start[:2])), start[2]])
-    here = reach_moved(scenario, instance, p_WG, x0, np.zeros(3))
-    there = reach_moved(scenario, instance, p_WG, x0, by)
+    here = reach_moved(scenario, instance, p_WG, x0, np.zeros(3), sleep)
+    there = reach_moved(scenario, instance, p_WG, x0, by, sleep)
     assert here.trace.q and there.outcome == here.outcome
     # Translations are exact here, so that even contact makes nothing of them.
     np.testing.assert_array_equal(there.trace.q, here.trace.q)
@@ -96,11 +97,11 @@ def test_a_base_aside_is_what_brings_a_goal_into_reach() -> None:
     assert environment.reach(far, X0).outcome == "invalid_start"
 
 
-def test_a_trace_tells_where_the_base_and_the_objects_are_in_the_world() -> None:
+def test_a_trace_tells_where_the_base_and_the_objects_are_in_the_world(sleep: bool) -> None:
     base = np.array([0.05, -0.3, 0.0])
     scenario = free_space(0.2)
     clutter = make_clutter(cylinder(0.7, 0.4, movable=True), box(0.9, 0.0, (0.1, 0.1, 0.2)))
-    environment = Environment(scenario, clutter, b0=base)
+    environment = Environment(scenario, clutter, sleep, base)
     trace = environment.reach(P_WG + base, X0 + base, keep_states=True).trace
     np.testing.assert_array_equal(trace.p_WR, base)
     np.testing.assert_allclose(trace.p_WO, [[0.7, 0.4]], atol=1e-12)
@@ -113,13 +114,13 @@ def test_a_trace_tells_where_the_base_and_the_objects_are_in_the_world() -> None
     np.testing.assert_allclose(trace.p_WE[0][:2], X0[:2] + base[:2], atol=1e-12)
 
 
-def test_a_record_gives_positions_in_the_world_and_the_base() -> None:
+def test_a_record_gives_positions_in_the_world_and_the_base(sleep: bool) -> None:
     base = (0.0, -0.25)
     scenario = small_clutter(1.0)
     request = reach_request(scenario, (0.65, -0.3), y_m=-0.2, phi_deg=60.0)
     request = replace(request, start=Start(request.start.x0, np.array([*base, 0.0])))
     instance = scenario.sample_instance(request.stream, request.environment)
-    environment = Environment(scenario, instance, b0=np.array([*base, 0.0]))
+    environment = Environment(scenario, instance, sleep, np.array([*base, 0.0]))
     result = environment.reach(request.goal, request.start.x0)
     record = make_record(request, result, 0.0)
     assert (record.base_x, record.base_y, record.after) == (*base, ())
@@ -138,7 +139,6 @@ def test_a_record_gives_positions_in_the_world_and_the_base() -> None:
     assert record.min_distance < 0.33
 
 
-@pytest.mark.parametrize("sleep", [True, False])
 @pytest.mark.parametrize("fixed", [True, False])
 def test_objects_that_touch_each_other_are_no_reason_to_refuse_a_start(
     sleep: bool, fixed: bool

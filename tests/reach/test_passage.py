@@ -14,8 +14,8 @@ from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 from lic_drake.reach.environment import Environment
 from lic_drake.reach.request import ReachRequest, is_within_reach
-from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import Scenario, load_scenario, parse_scenario, to_dict
+from lic_drake.reach.session import run_reach
 from lic_drake.reach.start import Start
 
 SCENARIO = load_scenario("passage-clutter")

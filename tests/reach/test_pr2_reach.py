@@ -7,12 +7,11 @@ from support.pr2_reaches import ARM, SCENARIO, spheres
 
 from lic_drake.errors import RequestError, ScenarioError
 from lic_drake.experience.collect import CollectionRequest
-from lic_drake.reach import rollout
 from lic_drake.reach.diagram import make_reach_diagram
 from lic_drake.reach.environment import Environment, simulate
 from lic_drake.reach.request import ReachRequest
-from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import load_scenario
+from lic_drake.reach.session import ReachSession, run_reach
 from lic_drake.reach.simulation import Simulation
 from lic_drake.reach.start import Start
 from lic_drake.reach.trace import ReachResult
@@ -59,7 +58,7 @@ def test_a_forearm_turns_on_beyond_half_a_turn() -> None:
     q[[4, 5]] = 3.1, -1.6
     beyond = q.copy()
     beyond[4] += 1.2
-    simulation = Simulation(make_reach_diagram(PRECISE, spheres()), PRECISE.scene)
+    simulation = Simulation(make_reach_diagram(PRECISE, spheres()))
     result = simulate(simulation, PRECISE, q, ARM.calc_pose(beyond).p_RE)
     assert result.outcome == "reached"
     rolls = np.array(result.trace.q)[:, 4]
@@ -104,9 +103,8 @@ def test_a_reach_into_forty_spheres_gives_the_same_record_again() -> None:
     assert record.min_distance < np.linalg.norm(p_WG - x0[:3])
     assert ReachRequest.from_record(record, BRIEF) == request
     assert ReachRequest.from_record(record, BRIEF).key == record.key
-    rollout._environments.clear()
-    assert comparable([run_reach(request)]) == comparable([record])
-    lone = run_reach(request, sleep=False)
+    assert comparable([ReachSession().run(request)]) == comparable([record])
+    lone = ReachSession(sleep=False).run(request)
     assert lone.outcome == record.outcome
     np.testing.assert_allclose(lone.q_final, record.q_final, atol=1e-3)
 

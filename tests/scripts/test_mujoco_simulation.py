@@ -6,8 +6,8 @@ from support.reaches import free_space, reach_request, start_angles
 from support.worlds import ARM, add_sensor, cylinder, make_clutter, make_world
 
 from lic_drake.reach.environment import simulate
-from lic_drake.reach.rollout import environment_of
 from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.session import default_session
 from lic_drake.reach.trace import ReachResult
 from lic_drake.scene.scene import SceneConfig
 
@@ -33,7 +33,7 @@ def test_without_clutter_a_reach_arrives_when_drakes_does(goal: tuple[float, flo
     scenario = free_space()
     mine = reach(scenario, start(scenario), goal)
     request = reach_request(scenario, goal)
-    drake = environment_of(request).reach(request.goal, request.start.x0)
+    drake = default_session(True).simulate(request)
     assert mine.outcome == drake.outcome == "reached"
     assert mine.trace.time_s[-1] == pytest.approx(drake.trace.time_s[-1], abs=0.041)
     samples = min(len(mine.trace.q), len(drake.trace.q))

@@ -19,8 +19,8 @@ from lic_drake.paths import shipped_library
 from lic_drake.perception.config import load_cameras
 from lic_drake.perception.observer import Observer
 from lic_drake.reach.request import ReachRequest
-from lic_drake.reach.rollout import run_reach
 from lic_drake.reach.scenario import load_scenario, parse_scenario
+from lic_drake.reach.session import run_reach
 from lic_drake.reach.start import Start
 from lic_drake.show.demonstration import demonstrate
 

@@ -10,7 +10,7 @@ from support.browser import assert_shows_a_scene, visit
 from lic_drake.cli.main import main
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_libraries, shipped_library
-from lic_drake.reach.rollout import run_reach
+from lic_drake.reach.session import run_reach
 from lic_drake.show.gallery import HEADS, Exhibit, choose_exhibits, make_gallery, numbers_of
 from lic_drake.show.page import embed, make_page, pack, picture
 

@@ -16,7 +16,8 @@ from support.worlds import ARM, cylinder, make_clutter
 from lic_drake.errors import RenderingError
 from lic_drake.evaluate.trial import Attempt
 from lic_drake.perception.image import CameraImage
-from lic_drake.reach.rollout import instance_of, make_record, simulate_request
+from lic_drake.reach.record import make_record
+from lic_drake.reach.session import instance_of, simulate_request
 from lic_drake.reach.trace import ReachTrace, SceneState
 from lic_drake.robots.pr2 import Q_HOME
 from lic_drake.select.situation import Selection

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lic_drake.control.tactile import ContactPatch, calc_taxel_forces
+from lic_drake.control.tactile_sensor import ContactPatch, calc_taxel_forces
 from lic_drake.control.taxels import planar_taxels
 from lic_drake.robots.planar import planar_arm
 
@@ -38,12 +38,9 @@ def press(link: int, p_L: np.ndarray, f_L: np.ndarray) -> np.ndarray:
     return calc_taxel_forces(LAYOUT, *POSES, [patch])
 
 
-@pytest.mark.parametrize("taxel", range(188))
-def test_a_contact_at_a_taxel_along_its_normal_lights_up_that_taxel_alone(taxel: int) -> None:
-    forces = press(LAYOUT.link[taxel], LAYOUT.p_LT[[taxel]], 3.0 * LAYOUT.n_L[[taxel]])
-    expected = np.zeros(188)
-    expected[taxel] = 3.0
-    np.testing.assert_allclose(forces, expected, atol=1e-12)
+def test_a_contact_at_a_taxel_along_its_normal_lights_up_that_taxel_alone() -> None:
+    forces = [press(LAYOUT.link[i], LAYOUT.p_LT[[i]], 3.0 * LAYOUT.n_L[[i]]) for i in range(188)]
+    np.testing.assert_allclose(forces, 3.0 * np.eye(188), atol=1e-12)
 
 
 POINT = st.tuples(st.floats(-0.02, 0.02), st.floats(-0.35, 0.02), st.floats(-0.02, 0.02))
@@ -65,19 +62,6 @@ def test_a_point_contact_loads_one_taxel_of_its_link_with_its_whole_force(
     own = np.flatnonzero(mine == loaded)[0]
     assert facing[own] < 45.0 + 1e-6
     assert distance[own] <= distance[facing < 45.0 - 1e-6].min() + 1e-12
-
-
-def test_the_45_degree_rule_sends_a_force_to_the_taxel_that_faces_it() -> None:
-    # Near the end of link 3's side: a force along the arm belongs to the cap, one across to
-    # the side, though the point of contact is the same.
-    corner = np.array([[0.012, -0.276, 0.0]])
-    for degrees, faces_side in ((0.0, True), (40.0, True), (80.0, False)):
-        a = np.deg2rad(degrees)
-        forces = press(2, corner, np.array([[np.cos(a), -np.sin(a), 0.0]]))
-        (loaded,) = np.flatnonzero(forces)
-        angle = np.rad2deg(np.arccos(LAYOUT.n_L[loaded] @ [np.cos(a), -np.sin(a), 0.0]))
-        assert angle <= 45.0
-        assert (LAYOUT.n_L[loaded, 0] > 0.7) == faces_side
 
 
 def test_a_force_that_no_taxel_faces_is_not_lost() -> None:
@@ -128,17 +112,6 @@ def test_a_wide_patch_spreads_over_the_taxels_under_it() -> None:
     assert centre[1] == pytest.approx(-0.15, abs=0.003)
 
 
-def test_a_patch_around_a_cap_spreads_over_its_taxels() -> None:
-    angle = np.deg2rad(np.linspace(-80.0, 80.0, 81))
-    n_L = np.column_stack([np.sin(angle), -np.cos(angle), np.zeros(81)])
-    p_L = np.array([0.0, -0.273, 0.0]) + 0.015 * n_L
-    forces = press(2, p_L, n_L / 81.0)
-    loaded = np.flatnonzero(forces)
-    assert forces.sum() == pytest.approx(1.0)
-    assert len(loaded) == 5
-    assert np.all(LAYOUT.n_L[loaded, 1] < 0.0)
-
-
 def test_an_edge_that_presses_with_both_its_sides_reads_as_one_contact() -> None:
     # The corner of a box on the side of a link: its two faces push at 40 and -50 degrees.
     directions = np.deg2rad([40.0, -50.0])
@@ -166,23 +139,9 @@ def test_contacts_add_up_taxel_by_taxel(contacts: list[tuple[int, float, float]]
     assert together.sum() == pytest.approx(sum(force for _, _, force in contacts))
 
 
-def test_a_patch_without_pressure_reads_nothing() -> None:
-    forces = press(2, np.array([[0.015, -0.1, 0.0]]), np.zeros((1, 3)))
-    np.testing.assert_array_equal(forces, 0.0)
-
-
 @pytest.mark.filterwarnings("error")
-def test_faces_whose_forces_cancel_read_nothing() -> None:
-    f_L = np.array([[2.0, 0.0, 0.0], [-2.0, 0.0, 0.0]])
+@pytest.mark.parametrize("force", [0.0, 2.0])
+def test_faces_whose_forces_cancel_read_nothing(force: float) -> None:
+    f_L = np.array([[force, 0.0, 0.0], [-force, 0.0, 0.0]])
     forces = press(2, np.array([[0.015, -0.1, 0.0]] * 2), f_L)
     np.testing.assert_allclose(forces, 0.0, atol=1e-12)
-
-
-@given(ANGLE, ANGLE, ANGLE)
-def test_readings_do_not_depend_on_the_configuration(q1: float, q2: float, q3: float) -> None:
-    R_RL, p_RL = ARM.calc_pose(np.array([q1, q2, q3]))[:2]
-    p_L, f_L = np.array([0.015, -0.1234, 0.0]), np.array([2.0, 0.5, 0.0])
-    patch = make_patch(1, (p_RL[1] + R_RL[1] @ p_L)[None], (R_RL[1] @ f_L)[None])
-    np.testing.assert_allclose(
-        calc_taxel_forces(LAYOUT, R_RL, p_RL, [patch]), press(1, p_L[None], f_L[None]), atol=1e-9
-    )

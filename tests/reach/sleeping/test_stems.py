@@ -5,9 +5,15 @@ import pytest
 from pydrake.systems.framework import DiagramBuilder
 
 from lic_drake.reach.scenario import load_scenario
+from lic_drake.reach.sleeping.monitors import (
+    GROUP_M,
+    MAX_MOVE_M,
+    WAKE_M,
+    MovedTooFarError,
+    SkinAxes,
+    StemMonitor,
+)
 from lic_drake.scene.scene import add_scene
-from lic_drake.scene.sleep import MAX_MOVE_M, WAKE_M, MovedTooFarError, SkinAxes
-from lic_drake.scene.stem_sleep import GROUP_M, StemMonitor
 from lic_drake.starts import board_starts
 
 SCENARIO = load_scenario("foliage-aperture-clutter")
@@ -61,7 +67,7 @@ def gaps_by_drake(q: np.ndarray) -> np.ndarray:
 def test_nobody_is_asleep_whom_the_arm_could_touch() -> None:
     q = further_in(30)[-1]
     monitor = StemMonitor(STEMS, AXES)
-    monitor.wake_near(q)
+    monitor.look(q)
     gaps = gaps_by_drake(q)
     assert np.any(gaps < WAKE_M)
     assert np.all(monitor.is_awake[gaps < WAKE_M])
@@ -73,10 +79,10 @@ def test_nobody_is_asleep_whom_the_arm_could_touch() -> None:
 def test_whom_the_arm_comes_near_wakes_up_at_once_or_step_by_step() -> None:
     at_once, step_by_step = StemMonitor(STEMS, AXES), StemMonitor(STEMS, AXES)
     path = further_in(30)
-    step_by_step.wake_near(path[0])
+    step_by_step.look(path[0])
     for q in path:
         step_by_step.look(q)
-    at_once.wake_near(q)
+    at_once.look(q)
     assert np.any(at_once.is_awake)
     # The group that wakes up with the first one is larger, or not, by where the arm was then.
     gaps = gaps_by_drake(q)
@@ -86,7 +92,7 @@ def test_whom_the_arm_comes_near_wakes_up_at_once_or_step_by_step() -> None:
 
 def test_a_leap_of_the_arm_is_refused() -> None:
     monitor = StemMonitor(STEMS, AXES)
-    monitor.wake_near(Q)
+    monitor.look(Q)
     leap = Q + np.array([3.0 * MAX_MOVE_M, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     with pytest.raises(MovedTooFarError):
         monitor.look(leap)

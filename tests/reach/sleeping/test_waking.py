@@ -1,5 +1,3 @@
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 from support.fake_reach import comparable
@@ -8,23 +6,16 @@ from support.worlds import box, cylinder, make_clutter
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.evaluate.trial import random_requests
-from lic_drake.reach import rollout
 from lic_drake.reach.environment import Environment
-from lic_drake.reach.rollout import run_reach
-from lic_drake.reach.scenario import load_scenario
+from lic_drake.reach.scenario import Scenario, load_scenario
+from lic_drake.reach.session import ReachSession
+from lic_drake.reach.simulation import Cache, find_free
+from lic_drake.reach.sleeping import monitors
+from lic_drake.reach.sleeping.waking import SleepingObjects, World
 from lic_drake.reach.trace import ReachResult
-from lic_drake.reach.waking import WakingSimulation
-from lic_drake.scene import sleep
 
 X0 = reach_request(free_space()).start.x0
 P_WG = np.array([0.7, 0.0, 0.0])
-
-
-@pytest.fixture(autouse=True)
-def fresh_process() -> Iterator[None]:
-    rollout._environments.clear()
-    yield
-    rollout._environments.clear()
 
 
 def both(
@@ -36,6 +27,10 @@ def both(
         Environment(scenario, instance).reach(p_WG, X0, keep_states=True),
         Environment(scenario, instance, sleep=False).reach(p_WG, X0, keep_states=True),
     )
+
+
+def sleeping(scenario: Scenario, instance: ClutterInstance) -> SleepingObjects:
+    return SleepingObjects(World(scenario, instance, 0.0, Cache(4)))
 
 
 def row(x: float, count: int) -> ClutterInstance:
@@ -75,7 +70,7 @@ def test_a_scene_moves_as_if_nothing_had_slept(instance: ClutterInstance) -> Non
 def test_no_sleeper_takes_part_in_the_dynamics() -> None:
     scenario = free_space(1.0)
     crowd = load_scenario("cylinder-clutter").sample_instance("calibration", 1)
-    simulation = WakingSimulation(scenario, crowd)
+    simulation = sleeping(scenario, crowd)
     simulation.begin(start_angles(scenario), P_WG)
     assert simulation.state().p_WO.shape == (40, 2)
     assert simulation._now.num_movable < 5
@@ -86,21 +81,20 @@ def test_a_sleeper_is_in_the_way_of_a_start() -> None:
     q = start_angles(scenario)
     elsewhere = q + [0.3, 0.0, 0.0]
     tip = scenario.arm().calc_pose(elsewhere).p_RE
-    simulation = WakingSimulation(scenario, make_clutter(cylinder(*tip[:2], movable=True)))
-    simulation.begin(elsewhere, P_WG)
-    np.testing.assert_array_equal(simulation.find_free(np.array([elsewhere, q])), q)
-    assert simulation.find_free(elsewhere[None]) is None
+    simulation = sleeping(scenario, make_clutter(cylinder(*tip[:2], movable=True)))
+    np.testing.assert_array_equal(find_free(simulation, np.array([elsewhere, q]), P_WG), q)
+    assert find_free(simulation, elsewhere[None], P_WG) is None
 
 
 def test_waking_up_changes_neither_places_nor_speeds() -> None:
     scenario = free_space(10.0)
-    simulation = WakingSimulation(scenario, row(0.52, 4))
+    simulation = sleeping(scenario, row(0.52, 4))
     simulation.begin(start_angles(scenario), P_WG)
     spares = set()
     for step in range(200):
         simulation.advance_to(step * scenario.mpc.period_s)
         before = simulation.state()
-        simulation.look_around(simulation.joint_angles())
+        simulation.wake_near(simulation.joint_angles())
         for a, b in zip(before, simulation.state(), strict=True):
             np.testing.assert_array_equal(a, b)
         spares.add(simulation._now.num_movable)
@@ -127,7 +121,7 @@ def test_the_next_reach_finds_everything_in_its_place() -> None:
 
 def test_where_waking_up_came_too_late_all_are_awake(monkeypatch: pytest.MonkeyPatch) -> None:
     _, awake = both(row(0.52, 2), 3.0)
-    monkeypatch.setattr(sleep, "MAX_MOVE_M", 1e-4)
+    monkeypatch.setattr(monitors, "MAX_MOVE_M", 1e-4)
     asleep, _ = both(row(0.52, 2), 3.0)
     assert asleep.outcome == awake.outcome
     np.testing.assert_array_equal(asleep.trace.q, awake.trace.q)
@@ -136,8 +130,7 @@ def test_where_waking_up_came_too_late_all_are_awake(monkeypatch: pytest.MonkeyP
 @pytest.mark.slow
 def test_records_of_300_reaches_are_the_same_with_and_without_sleep() -> None:
     requests = random_requests(load_scenario("cylinder-clutter"), "calibration", 60, 5)
-    asleep = [run_reach(request) for request in requests]
-    awake = [run_reach(request, sleep=False) for request in requests]
+    asleep, awake = (list(map(ReachSession(on).run, requests)) for on in (True, False))
     assert sum(a.outcome != b.outcome for a, b in zip(asleep, awake, strict=True)) <= 3
     same = [
         all(getattr(a, m) == pytest.approx(getattr(b, m), abs=1e-6, nan_ok=True) for m in MEASURED)
@@ -149,7 +142,6 @@ def test_records_of_300_reaches_are_the_same_with_and_without_sleep() -> None:
 
 def test_a_sleeping_record_is_the_same_again() -> None:
     requests = random_requests(load_scenario("cylinder-clutter"), "calibration", 1, 3)
-    once = [run_reach(request) for request in requests]
-    rollout._environments.clear()
-    again = [run_reach(request) for request in reversed(requests)]
+    once = list(map(ReachSession().run, requests))
+    again = list(map(ReachSession().run, reversed(requests)))
     assert comparable(once) == comparable(again[::-1])

@@ -1,7 +1,7 @@
 """What a reach does when the simulation fails: an outcome, never an exception."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,19 +11,13 @@ from support.reaches import assert_never_began, free_space, reach_request, small
 
 from lic_drake.control import tactile_sensor
 from lic_drake.control.mpc import HapticMpc
-from lic_drake.reach import rollout as dut
-from lic_drake.reach import simulation
-from lic_drake.reach.rollout import run_reach
+from lic_drake.reach.session import run_reach
+from lic_drake.scene import scene
 
 FREE = free_space()
 
 
-@pytest.fixture(autouse=True)
-def fresh_process() -> Iterator[None]:
-    """Forgets the environment that an earlier test left."""
-    dut._environments.clear()
-    yield
-    dut._environments.clear()
+pytestmark = pytest.mark.usefixtures("session")
 
 
 class Failing(Simulator):
@@ -38,7 +32,7 @@ class Failing(Simulator):
 def test_a_solver_failure_is_an_outcome_with_what_was_measured_before(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(simulation, "Simulator", Failing)
+    monkeypatch.setattr(scene, "Simulator", Failing)
     record = run_reach(reach_request(FREE))
     assert (record.outcome, record.success) == ("diverged", False)
     assert record.detail == "The solver failed to converge at t = 0.12"
@@ -100,7 +94,7 @@ def test_a_reach_that_fails_before_its_first_sample_has_no_measurements(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(Failing, "AdvanceTo", failing_after(0, print, RuntimeError("x" * 1000)))
-    monkeypatch.setattr(simulation, "Simulator", Failing)
+    monkeypatch.setattr(scene, "Simulator", Failing)
     record = run_reach(reach_request(FREE))
     assert_never_began(record, "diverged")
     assert record.detail == "x" * 200
@@ -110,6 +104,6 @@ def test_the_next_reach_is_not_harmed_by_a_failure(monkeypatch: pytest.MonkeyPat
     request = reach_request(small_clutter(1.0))
     expected = run_reach(request)
     with monkeypatch.context() as patch:
-        patch.setattr(simulation, "Simulator", Failing)
+        patch.setattr(scene, "Simulator", Failing)
         assert run_reach(request).outcome == "diverged"
     assert run_reach(request) == expected

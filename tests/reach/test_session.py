@@ -1,5 +1,5 @@
-from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,11 +16,11 @@ from support.reaches import (
 from support.worlds import box, cylinder, make_clutter
 
 from lic_drake.clutter.instance import ClutterInstance
-from lic_drake.reach import rollout as dut
 from lic_drake.reach.environment import Environment
+from lic_drake.reach.record import make_record
 from lic_drake.reach.request import ReachRecord, ReachRequest
-from lic_drake.reach.rollout import make_record, run_reach
 from lic_drake.reach.scenario import load_scenario
+from lic_drake.reach.session import ReachSession, run_reach
 from lic_drake.reach.start import Start
 from lic_drake.reach.trace import ReachResult, ReachTrace
 
@@ -28,18 +28,18 @@ FREE = free_space()
 X0 = reach_request(FREE).start.x0
 
 
-@pytest.fixture(autouse=True)
-def fresh_process() -> Iterator[None]:
-    """Forgets the environment that an earlier test left."""
-    dut._environments.clear()
-    yield
-    dut._environments.clear()
+pytestmark = pytest.mark.usefixtures("session")
 
 
-def in_clutter(instance: ClutterInstance, goal: tuple[float, float] = (0.6, 0.1), **values: Any):
+def in_clutter(
+    instance: ClutterInstance,
+    goal: tuple[float, float] = (0.6, 0.1),
+    sleep: bool = True,
+    **values: Any,
+):
     """Runs a reach from the easy start in hand-made clutter."""
     scenario = free_space(**values)
-    return Environment(scenario, instance).reach(np.array([*goal, 0.0]), X0)
+    return Environment(scenario, instance, sleep).reach(np.array([*goal, 0.0]), X0)
 
 
 # Outcomes
@@ -107,6 +107,17 @@ def test_time_runs_out_at_the_sample_of_the_timeout() -> None:
     assert (record.outcome, record.duration_s) == ("timeout", 0.4)
 
 
+def test_given_joint_angles_are_executed_if_they_bring_the_hand_to_its_start() -> None:
+    request = reach_request(free_space(timeout_s=0.1))
+    q = FREE.arm().solve_ik(X0)[0]
+    # In the plane they are the only ones, so that the request is the same.
+    record = run_reach(replace(request, start=Start(X0, q=q + [3e-5, 0.0, 0.0])))
+    np.testing.assert_array_equal(record.q_start, q + [3e-5, 0.0, 0.0])
+    record = run_reach(replace(request, start=Start(X0, q=q + [1e-3, 0.0, 0.0])))
+    assert_never_began(record, "invalid_start")
+    assert record.detail == "the joint angles do not bring the hand to x0"
+
+
 @pytest.mark.parametrize("goal", [(0.9, 0.3), (-5.0, 5.0)])
 def test_goals_out_of_reach_are_not_simulated(goal: tuple[float, float]) -> None:
     record = run_reach(reach_request(FREE, goal))
@@ -137,12 +148,13 @@ def test_a_start_that_touches_a_cylinder_is_invalid() -> None:
 
 
 @pytest.mark.parametrize("movable", [False, True])
-def test_touching_begins_where_the_surfaces_meet(movable: bool) -> None:
+def test_touching_begins_where_the_surfaces_meet(movable: bool, sleep: bool) -> None:
     # The last link's round end reaches as far as the tip; the cylinder's radius is 10 mm.
     along = np.array([np.cos(X0[2]), np.sin(X0[2])])
     for gap, expected in ((0.0003, False), (-0.0003, True)):
         x, y = X0[:2] + (0.010 + gap) * along
-        outcome, trace, _ = in_clutter(make_clutter(cylinder(x, y, movable=movable)), timeout_s=0.1)
+        post = make_clutter(cylinder(x, y, movable=movable))
+        outcome, trace, _ = in_clutter(post, sleep=sleep, timeout_s=0.1)
         assert (outcome == "invalid_start") == expected
         assert (trace.q == []) == expected
 
@@ -185,13 +197,12 @@ def requests() -> list[ReachRequest]:
     ]
 
 
-def alone(request: ReachRequest) -> ReachRecord:
-    dut._environments.clear()
-    return run_reach(request)
+def alone(request: ReachRequest, sleep: bool) -> ReachRecord:
+    return ReachSession(sleep).run(request)
 
 
-def test_records_do_not_depend_on_what_ran_before_in_the_process() -> None:
-    expected = [alone(request) for request in requests()]
+def test_records_do_not_depend_on_what_ran_before_in_the_process(sleep: bool) -> None:
+    expected = [alone(request, sleep) for request in requests()]
     assert any(record.peak_contacts > 0 for record in expected)
     in_a_row = [run_reach(request) for request in requests()]
     # NaN is not equal to itself, hence the comparison as text; dataclasses compare the others.
@@ -202,31 +213,33 @@ def test_records_do_not_depend_on_what_ran_before_in_the_process() -> None:
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_records_are_the_same_in_other_processes(workers: int) -> None:
+def test_records_are_the_same_in_other_processes(workers: int, sleep: bool) -> None:
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
 
-    expected = [alone(request) for request in requests()]
+    expected = [alone(request, sleep) for request in requests()]
     with ProcessPoolExecutor(workers, mp_context=get_context("forkserver")) as pool:
-        elsewhere = list(pool.map(run_reach, requests()))
+        elsewhere = list(pool.map(partial(run_reach, sleep=sleep), requests()))
     assert comparable(elsewhere) == comparable(expected)
 
 
-def test_only_the_last_environment_is_kept() -> None:
-    scenario = free_space(0.04)
-    first = dut.environment_of(reach_request(scenario, environment=0))
-    assert dut.environment_of(reach_request(scenario, (0.5, 0.0), environment=0)) is first
-    second = dut.environment_of(reach_request(scenario, environment=1))
-    assert second is not first
-    assert list(dut._environments.values()) == [second]
-
-
-def test_another_scenario_or_stream_is_another_environment() -> None:
-    request = reach_request(free_space(0.04))
-    first = dut.environment_of(request)
-    assert dut.environment_of(reach_request(free_space(0.08))) is not first
-    other = dut.environment_of(reach_request(free_space(0.04), stream="evaluation"))
-    assert dut.environment_of(request) is not other
+def test_environments_are_kept_and_are_those_of_their_scenario_stream_and_index(
+    session: ReachSession,
+) -> None:
+    request = reach_request(free_space(0.04), environment=0)
+    first = session.environment(request)
+    assert session.environment(reach_request(free_space(0.04), (0.5, 0.0), environment=0)) is first
+    for other in (
+        reach_request(free_space(0.04), environment=1),
+        reach_request(free_space(0.08)),
+        reach_request(free_space(0.04), stream="evaluation"),
+    ):
+        assert session.environment(other) is not first
+    for index in range(20):
+        session.run(reach_request(free_space(0.04), environment=index))
+    assert 0 < len(session.environments) <= session.environments.size
+    assert len(session.diagrams) <= session.diagrams.size
+    assert session.environment(request) is not first
 
 
 # Time

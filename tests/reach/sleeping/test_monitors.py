@@ -10,18 +10,16 @@ from support.worlds import ARM, box, cylinder, make_clutter, make_world
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.clutter.placement import place_discs
 from lic_drake.reach.scenario import load_scenario
-from lic_drake.scene.scene import SceneConfig
-from lic_drake.scene.sleep import (
+from lic_drake.reach.sleeping.monitors import (
     MAX_MOVE_M,
     MOVED_M,
-    PARKING_M,
     WAKE_M,
     MovedTooFarError,
+    ObjectMonitor,
     SkinAxes,
-    SleepMonitor,
-    can_sleep,
-    put_to_sleep,
 )
+from lic_drake.reach.sleeping.waking import PARKING_M, can_sleep, put_to_sleep
+from lic_drake.scene.scene import SceneConfig
 
 AXES = SkinAxes(ARM)
 RADIUS = 0.01
@@ -86,7 +84,7 @@ def test_those_and_only_those_sleep_that_nothing_can_reach_before_the_next_look(
 ) -> None:
     instance = crowd(seed)
     first = instance.p_WO[:, :2]
-    monitor = SleepMonitor(instance, AXES, Q)
+    monitor = ObjectMonitor(instance, AXES)
     q, awake, positions = Q.copy(), list[int](), first.copy()
     for move in [(0.0, 0.0, 0.0), *moves]:
         q = np.clip(q + move, ARM.q_min, ARM.q_max)
@@ -105,7 +103,7 @@ def test_those_and_only_those_sleep_that_nothing_can_reach_before_the_next_look(
 def test_a_move_that_is_too_long_to_wake_up_in_time_is_told(too_far: bool) -> None:
     distance = np.linalg.norm(ARM.calc_pose(Q).p_RE[:2])
     angle = (1.2 if too_far else 0.6) * MAX_MOVE_M / distance
-    monitor = SleepMonitor(CROWD, AXES, Q)
+    monitor = ObjectMonitor(CROWD, AXES)
     woken = monitor.look(Q, np.zeros((0, 2)))
     positions = CROWD.p_WO[CROWD.movable, :2][woken]
     if too_far:
@@ -117,7 +115,7 @@ def test_a_move_that_is_too_long_to_wake_up_in_time_is_told(too_far: bool) -> No
 
 def test_a_pushed_object_that_moves_too_far_is_told() -> None:
     tip = ARM.calc_pose(Q).p_RE
-    monitor = SleepMonitor(make_clutter(cylinder(tip[0], tip[1] + 0.02, movable=True)), AXES, Q)
+    monitor = ObjectMonitor(make_clutter(cylinder(tip[0], tip[1] + 0.02, movable=True)), AXES)
     assert monitor.look(Q, np.zeros((0, 2))) == [0]
     p_WO = tip[None, :2] + [0.0, 0.02]
     monitor.look(Q, p_WO + [0.5 * MAX_MOVE_M, 0.0])
