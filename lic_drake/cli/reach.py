@@ -155,7 +155,7 @@ def _record(request: "ReachRequest", path: Path) -> None:
 
     recording = Recording(request.scenario, instance_of(request))
     trace = simulate_request(request, keep_states=True).trace
-    recording.add_reach(trace, request.goal, request.start.b0)
+    recording.add_reach(trace, request.goal)
     recording.save(path)
 
 

@@ -103,23 +103,22 @@ def record_trial(trial: ShownTrial, drake_models: Path | None = None) -> Recordi
     approach = None if in_plane(scenario) else Approach(scenario, instance)
     recording = Recording(scenario, instance, drake_models, approach)
     before: ReachTrace | None = None
-    for attempt, trace in trial:
-        b0 = attempt.request.start.b0
+    for trace in trial.traces:
         if approach is not None and trace.q:
             if before is not None:
                 recording.retract(before)
-            recording.move_to(b0, trace.q[0])
+            recording.move_to(trace.p_WR, trace.q[0])
             before = trace
-        recording.add_reach(trace, trial.p_WG, b0)
+        recording.add_reach(trace, trial.p_WG)
     return recording
 
 
 def _film(trial: ShownTrial, observer: Observer) -> Iterator[NDArray[np.uint8]]:
     camera = FilmCamera(trial.instance, trial.p_WG, observer.cameras)
     step = max(1, round(trial.scenario.mpc.rate_hz / FRAMES_PER_SECOND))
-    for attempt, trace in trial:
+    for trace in trial.traces:
         for state in trace.states[::step]:
-            yield camera.frame(attempt.request.start.b0, state)
+            yield camera.frame(trace.p_WR, state)
 
 
 def _path_figure(trial: ShownTrial) -> Figure:

@@ -3,17 +3,11 @@
 import logging
 import os
 from pathlib import Path
-from typing import cast
 
 from pydrake.geometry import (
     FrameId,
     GeometryInstance,
-    GeometryProperties,
-    IllustrationProperties,
     Mesh,
-    PerceptionProperties,
-    RenderLabel,
-    Rgba,
     Role,
     SceneGraph,
 )
@@ -101,8 +95,10 @@ def _move_meshes(scene: Scene, source: MultibodyPlant, source_graph: SceneGraph)
     context, inspector = source.CreateDefaultContext(), source_graph.model_inspector()
     joints = [source.get_joint(index) for index in source.GetJointIndices()]
     parents = {joint.child_body().name(): joint.parent_body().name() for joint in joints}
-    frames = _visible_links(scene)
-    files: list[tuple[str, Path]] = []
+    source_id, frames = scene.plant.get_source_id(), _visible_links(scene)
+    assert source_id is not None
+    meshed: set[str] = set()
+    files: list[Path] = []
     for name in parents:
         link = name  # The nearest link towards the base that the scene's robot has, too.
         while link not in (*frames, *_HEAD_PARTS) and link in parents:
@@ -113,18 +109,26 @@ def _move_meshes(scene: Scene, source: MultibodyPlant, source_graph: SceneGraph)
         body = source.GetBodyByName(name)
         X_WL = source.EvalBodyPoseInWorld(context, source.GetBodyByName(frame))
         X_LB = X_WL.inverse() @ source.EvalBodyPoseInWorld(context, body)
-        for geometry in source.GetVisualGeometriesForBody(body):
-            mesh = inspector.GetShape(geometry)
-            if isinstance(mesh, Mesh):  # Boxes of the source mark frames.
-                X_LM = X_LB @ inspector.GetPoseInFrame(geometry)
-                color = _color(inspector.GetIllustrationProperties(geometry))
-                if link not in {used for used, _ in files}:
-                    _hide(scene, frames[link])
-                _attach(
-                    scene, frames[link], GeometryInstance(X_LM, mesh, f"mesh{len(files)}"), color
-                )
-                files.append((link, Path(mesh.source().path())))
-    return [path for _, path in files]
+        for old in source.GetVisualGeometriesForBody(body):
+            mesh = inspector.GetShape(old)
+            if not isinstance(mesh, Mesh):  # Boxes of the source mark frames.
+                continue
+            if link not in meshed:
+                for role in (Role.kIllustration, Role.kPerception):
+                    scene.scene_graph.RemoveRole(source_id, frames[link], role)
+                meshed.add(link)
+            X_LM = X_LB @ inspector.GetPoseInFrame(old)
+            instance = GeometryInstance(X_LM, mesh, f"mesh{len(files)}")
+            new = scene.scene_graph.RegisterGeometry(source_id, frames[link], instance)
+            seen, rendered = (
+                inspector.GetIllustrationProperties(old),
+                inspector.GetPerceptionProperties(old),
+            )
+            assert seen is not None and rendered is not None
+            scene.scene_graph.AssignRole(source_id, new, seen)
+            scene.scene_graph.AssignRole(source_id, new, rendered)
+            files.append(Path(mesh.source().path()))
+    return files
 
 
 def _visible_links(scene: Scene) -> dict[str, FrameId]:
@@ -137,30 +141,3 @@ def _visible_links(scene: Scene) -> dict[str, FrameId]:
         for name, frame in frames.items()
         if inspector.GetGeometries(frame, Role.kIllustration)
     }
-
-
-def _color(properties: GeometryProperties | None) -> Rgba | None:
-    """Returns the colour in which a mesh is painted, None if its file has colours of its own."""
-    if properties is None or not properties.HasProperty("phong", "diffuse"):
-        return None
-    return cast(Rgba, properties.GetProperty("phong", "diffuse"))
-
-
-def _hide(scene: Scene, frame: FrameId) -> None:
-    """Takes a link's own shapes out of pictures."""
-    source_id = scene.plant.get_source_id()
-    assert source_id is not None
-    for role in (Role.kIllustration, Role.kPerception):
-        scene.scene_graph.RemoveRole(source_id, frame, role)
-
-
-def _attach(scene: Scene, frame: FrameId, instance: GeometryInstance, color: Rgba | None) -> None:
-    source_id = scene.plant.get_source_id()
-    assert source_id is not None
-    geometry = scene.scene_graph.RegisterGeometry(source_id, frame, instance)
-    seen, rendered = IllustrationProperties(), PerceptionProperties()
-    rendered.AddProperty("label", "id", RenderLabel.kDontCare)
-    for properties in (seen, rendered):
-        if color is not None:
-            properties.AddProperty("phong", "diffuse", color)
-        scene.scene_graph.AssignRole(source_id, geometry, properties)

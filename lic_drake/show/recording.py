@@ -104,17 +104,16 @@ class Recording:
         if approach is not None:
             self._draw()
 
-    def add_reach(self, trace: ReachTrace, p_WG: Vector, b0: Vector | None = None) -> None:
+    def add_reach(self, trace: ReachTrace, p_WG: Vector) -> None:
         """Records a reach.
 
         Args:
             trace: Its samples with their states.
             p_WG: Its goal, shape (3,), metres.
-            b0: Base position and torso height, shape (3,), metres; by default the trace's.
         """
         self._draw_goal(p_WG)
         self._show_forces(True)
-        self._b0 = trace.p_WR if b0 is None else b0
+        self._b0 = trace.p_WR
         begin = self._clock_s
         for k in range(0, len(trace.states), self._sample_step()):
             self._clock_s = begin + trace.time_s[k]

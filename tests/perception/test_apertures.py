@@ -9,7 +9,6 @@ from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import PerceptionError, ScenarioError
 from lic_drake.perception.apertures import DetectedApertures, find_apertures
 from lic_drake.perception.board_grid import BoardModel
-from lic_drake.perception.board_plane import find_board_plane
 from lic_drake.perception.config import CameraConfig, PoseErrorConfig
 from lic_drake.perception.image import CameraImage
 from lic_drake.perception.noise import disturbed_image
@@ -119,18 +118,6 @@ def test_what_is_far_behind_the_board_covers_nothing_though_nothing_is_measured_
     image = look(instance)
     draw_boxes(image, np.array([[0.6, -0.19, 0.94]]), np.array([[0.02, 2.0, 2.0]]), [OTHER])
     assert set(find(image).states) == {"open"}
-
-
-def test_the_plane_of_the_board_is_its_front() -> None:
-    image = look(draw(replace(BARE, num_blocked=0, num_partly_covered=0)))
-    plane = find_board_plane(image, CAMERA)
-    R_WB = image.R_WC @ plane.R_CB
-    np.testing.assert_allclose(R_WB, np.eye(3), atol=0.005)
-    p_WO = image.p_WC + image.R_WC @ plane.p_CO
-    assert p_WO[0] == pytest.approx(0.525, abs=0.002)
-    shifted = plane.shifted(0.1)
-    p_WO = image.p_WC + image.R_WC @ shifted.p_CO
-    assert p_WO[0] == pytest.approx(0.625, abs=0.002)
 
 
 def test_an_image_without_a_board_is_refused() -> None:

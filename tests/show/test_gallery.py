@@ -9,7 +9,7 @@ from support.browser import assert_shows_a_scene, visit
 
 from lic_drake.cli.main import main
 from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.paths import shipped_libraries, shipped_library
+from lic_drake.paths import shipped_library
 from lic_drake.reach.session import run_reach
 from lic_drake.show.gallery import HEADS, Exhibit, choose_exhibits, make_gallery, numbers_of
 from lic_drake.show.page import embed, make_page, pack, picture
@@ -63,12 +63,6 @@ def test_the_page_s_numbers_are_those_of_the_records(exhibits: list[Exhibit]) ->
         assert row[3] == attempt.record.outcome
         assert float(row[6]) == pytest.approx(attempt.record.peak_force, abs=0.05)
         assert numbers_of(number, attempt)["estimated_success"] is None
-
-
-def test_the_shipped_libraries_are_found() -> None:
-    assert {path.name for path in shipped_libraries()} >= {
-        *("cylinder-clutter", "passage-clutter", "cylinder-aperture-clutter")
-    }
 
 
 def test_pages_escape_text_and_hold_what_they_are_given() -> None:

@@ -15,7 +15,6 @@ from lic_drake.reach.environment import Environment
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.show.approach import Approach
-from lic_drake.show.page import embed
 from lic_drake.show.recording import MOVE_S, PAUSE_S, Recording, frame_rate
 from lic_drake.starts import board_starts, standing_at
 
@@ -99,7 +98,7 @@ def test_the_robot_moves_base_torso_and_arm_in_that_order_and_the_arm_goes_back(
 
     recording = Recording(scenario, instance, approach=Approach(scenario, instance))
     recording.move_to(b0, q)
-    recording.add_reach(result.trace, p_WG, b0)
+    recording.add_reach(result.trace, p_WG)
     recording.retract(result.trace)
     html = recording.html()
     base, torso, wrist = (
@@ -160,24 +159,3 @@ def test_a_browser_shows_arm_clutter_goal_and_start_line(tmp_path: Path, chromiu
     assert hue_share(image[40:], 25, 50) > 2e-3, "movable cylinders"
     assert hue_share(image[40:], 0, 20) > 2e-3, "fixed cylinders"
     assert hue_share(image[40:], 110, 150) > 1e-4, "start line"
-
-
-@pytest.mark.slow
-@pytest.mark.browser
-def test_a_browser_plays_it_inside_another_page(tmp_path: Path, chromium: str) -> None:
-    scenario = load_scenario("cylinder-clutter")
-    recording = Recording(scenario, scenario.sample_instance("evaluation", 0))
-    recording.move_to(np.array([0.0, 0.1, 0.0]), EASY_POSTURE)
-    recording.add_reach(ReachTrace(), P_WG)
-    page = tmp_path / "notebook.html"
-    frame = embed(recording.html(), height_px=700)
-    page.write_text(f"<!DOCTYPE html><html><body>{frame}</body></html>", encoding="utf-8")
-    image, console = visit(chromium, f"file://{page}", tmp_path)
-    assert console == []
-    assert_shows_a_scene(image[60:])
-    page.write_text("<body><script>console.log('one'); none()</script></body>", encoding="utf-8")
-    image, console = visit(chromium, f"file://{page}", tmp_path)
-    assert len(console) == 2
-    assert "none is not defined" in console[1]
-    with pytest.raises(AssertionError):
-        assert_shows_a_scene(image)

@@ -1,6 +1,10 @@
 """Rendered images against rays that are intersected without a renderer."""
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +17,6 @@ from lic_drake.perception.cameras import take_views
 from lic_drake.perception.config import CameraConfig, CamerasConfig, ExternalConfig, HeadConfig
 from lic_drake.perception.goal import find_goal
 from lic_drake.perception.image import Views
-from lic_drake.perception.noise import disturbed_views
 from lic_drake.seeds import make_generator
 
 CAMERA = CameraConfig(width=320, height=240, focal_px=262.5)
@@ -68,11 +71,19 @@ def test_what_is_rendered_is_found(views: Views) -> None:
     np.testing.assert_allclose(goal.p_WG, P_WG, atol=5e-4)
 
 
-def test_disturbed_views_are_the_same_for_the_same_generator(views: Views) -> None:
-    first, second, other = (
-        disturbed_views(views, CAMERAS, np.random.default_rng(seed)) for seed in (0, 0, 1)
+def test_without_graphics_libraries_the_foliage_demo_is_refused_in_one_line_before_it_learns(
+    tmp_path: Path,
+) -> None:
+    for name in ("libEGL.so.1", "libEGL.so"):
+        (tmp_path / name).touch()
+    demo = ["demo", "--robot", "pr2", "--category", "foliage-aperture-clutter"]
+    result = subprocess.run(
+        [sys.executable, "-m", "lic_drake", *demo, "--out", str(tmp_path / "out")],
+        env={**os.environ, "LD_LIBRARY_PATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
     )
-    np.testing.assert_array_equal(first.head.depth, second.head.depth)
-    np.testing.assert_array_equal(first.external.p_WC, second.external.p_WC)
-    assert np.any(first.head.p_WC != other.head.p_WC)
-    assert np.isnan(first.head.depth).sum() > np.isnan(views.head.depth).sum()
+    assert (result.returncode, result.stdout) == (2, "")
+    assert result.stderr.startswith("lic: error: cameras cannot be simulated: ")
+    assert result.stderr.endswith("apt-get install libegl1 libgl1 libgl1-mesa-dri\n")
+    assert result.stderr.count("\n") == 1
