@@ -22,20 +22,17 @@ from lic_drake.types import Vector
 class SuccessEstimator(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[misc]
     """F(s, x0) of paper III-D: an estimate of P(success), with its gradient for Eq. (4).
 
-    It is a binary classifier of scikit-learn with classes 0 (failure) and 1 (success). A subclass
-
-    - keeps the arguments of its constructor, unchanged, under their own names, so that
-      `get_params`, `set_params` and `sklearn.base.clone` work,
-    - implements `_fit` and `_values`, which get arrays that were checked already,
-    - may override `_value_and_gradient` where it knows its gradient, and `_settled` where `fit`
-      chooses settings that later rows should not change.
+    A binary classifier in scikit-learn's sense, with classes 0 (failure) and 1 (success). A
+    subclass follows scikit-learn's rules for constructor arguments, so that `clone` works, and
+    implements `_fit` and `_values`, whose arguments are validated. It may override
+    `_value_and_gradient` with an exact gradient, and `_settled` if `fit` chooses settings that
+    later rows should not change.
 
     Attributes:
         gradient_step: Half width of the numerical gradient's central difference, in standard
-            deviations of a feature. It is wide enough for estimates that are flat between steps:
-            the difference is the slope of the estimate averaged over this width.
+            deviations of a feature; wide enough for piecewise constant estimates.
         classes_: 0 and 1.
-        n_features_in_: Number of features d of the rows.
+        n_features_in_: Number of features d.
         scale_: Standard deviation of each feature, shape (d,).
     """
 
@@ -48,14 +45,13 @@ class SuccessEstimator(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[mis
         groups: ArrayLike | None = None,
         sample_weight: ArrayLike | None = None,
     ) -> Self:
-        """Learns from rows and returns itself.
+        """Fits to rows and returns itself.
 
         Args:
             X: Features, shape (n, d), see `lic_drake.estimate.features`.
             y: Successes, shape (n,), each 0 or 1.
-            groups: Number of each row's environment, shape (n,). Reaches in one environment
-                succeed and fail together; an estimator that knows them smooths more.
-            sample_weight: How many reaches each row counts as, shape (n,); one by default.
+            groups: Environment of each row, shape (n,): outcomes within one are correlated.
+            sample_weight: Number of reaches that each row counts as, shape (n,); one by default.
 
         Raises:
             EstimateError: The rows are unusable.
@@ -68,14 +64,7 @@ class SuccessEstimator(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[mis
     def conditioned_on(
         self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None
     ) -> Self:
-        """Returns a new estimator with the settings that `fit` chose and other rows.
-
-        Estimators that choose no settings are fitted anew.
-
-        Args:
-            X: Features, shape (n, d).
-            y: Successes, shape (n,), each 0 or 1.
-            sample_weight: How many reaches each row counts as, shape (n,); one by default.
+        """Returns a new estimator fitted to other rows, with the settings that `fit` chose here.
 
         Raises:
             EstimateError: Not fitted yet, or the rows are unusable.
@@ -84,22 +73,21 @@ class SuccessEstimator(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[mis
         return self._settled().fit(X, y, sample_weight=sample_weight)
 
     def values(self, X: ArrayLike) -> Vector:
-        """Returns the estimates for queries X, shape (n, d), not clipped into [0, 1]: shape (n,).
+        """Returns estimates for queries X, shape (n, d), not clipped to [0, 1]: shape (n,).
 
-        A clipped estimate would be flat where an optimiser needs to climb, and tie the best starts
-        with each other.
+        Clipping would remove the gradient near 0 and 1 and tie the best starts.
 
         Raises:
-            EstimateError: Not fitted yet, or queries that do not fit.
+            EstimateError: Not fitted yet, or unusable queries.
         """
         self._check_fitted()
         return self._values(check_queries(X, self.n_features_in_))
 
     def value_and_gradient(self, x: ArrayLike) -> tuple[float, Vector]:
-        """Returns the estimate at x, shape (d,), not clipped, and its gradient by x, shape (d,).
+        """Returns the unclipped estimate at x, shape (d,), and its gradient, shape (d,).
 
         Raises:
-            EstimateError: Not fitted yet, or a query that does not fit.
+            EstimateError: Not fitted yet, or an unusable query.
         """
         self._check_fitted()
         return self._value_and_gradient(check_queries(np.atleast_2d(x), self.n_features_in_)[0])
@@ -110,19 +98,19 @@ class SuccessEstimator(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[mis
         return np.column_stack([1.0 - success, success])
 
     def predict(self, X: ArrayLike) -> Vector:
-        """Returns the likelier outcome of queries X, 0 or 1, shape (n,)."""
+        """Returns the more likely outcome of queries X, 0 or 1, shape (n,)."""
         return (self.values(X) >= 0.5).astype(np.float64)
 
     @abstractmethod
     def _fit(self, X: Vector, y: Vector, groups: Any, weight: Vector) -> None:
-        """Learns from checked rows; see `fit`. `groups` is None or an array, shape (n,)."""
+        """Fits to validated rows; see `fit`. `groups` is None or an array, shape (n,)."""
 
     @abstractmethod
     def _values(self, X: Vector) -> Vector:
-        """Returns unclipped estimates of checked queries; see `values`."""
+        """Returns unclipped estimates for validated queries; see `values`."""
 
     def _value_and_gradient(self, x: Vector) -> tuple[float, Vector]:
-        """Returns value and gradient at a checked query, by default from central differences."""
+        """Returns value and gradient at a validated query, by default by central differences."""
         h = self.gradient_step * self.scale_
         values = self._values(np.vstack([x, x + np.diag(h), x - np.diag(h)]))
         up, down = np.split(values[1:], 2)
@@ -133,7 +121,7 @@ class SuccessEstimator(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[mis
         return cast(Self, clone(self))
 
     def _learn(self, X: Vector, y: Vector, groups: Any, weight: Vector) -> Self:
-        """Fits to rows that were checked already, and returns itself."""
+        """Fits to validated rows and returns itself."""
         self._fit(X, y, groups, weight)
         self.classes_ = np.array([0.0, 1.0])
         self.n_features_in_ = X.shape[1]
@@ -151,23 +139,18 @@ class SuccessEstimator(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[mis
 
 
 def from_sklearn(model: Any, gradient_step: float = 0.2) -> "SklearnEstimator":
-    """Returns a success estimator that asks a classifier or regressor of scikit-learn.
+    """Wraps a scikit-learn classifier or regressor as a success estimator.
 
     Args:
-        model: The unfitted model, for instance a `HistGradientBoostingClassifier` or a `Pipeline`.
-            A classifier's estimate is its probability of class 1, a regressor's its prediction.
+        model: The unfitted model. A classifier's estimate is its probability of class 1, a
+            regressor's its prediction.
         gradient_step: See `SuccessEstimator`; small for a smooth model.
     """
     return SklearnEstimator(model, gradient_step)
 
 
 class SklearnEstimator(SuccessEstimator):
-    """See `from_sklearn`. If all reaches ended alike, that outcome is the estimate.
-
-    Attributes:
-        model: The unfitted model; `fit` works on a clone.
-        model_: The fitted one; None if all reaches ended alike.
-    """
+    """See `from_sklearn`; `model_` is the fitted clone, None if all outcomes are equal."""
 
     def __init__(self, model: Any, gradient_step: float = 0.2) -> None:
         self.model = model
@@ -178,8 +161,8 @@ class SklearnEstimator(SuccessEstimator):
         if np.any(weight != weight[0]):
             if not has_fit_parameter(self.model, "sample_weight"):
                 raise EstimateError(
-                    f"{type(self.model).__name__} cannot weight its rows, and the library has rows"
-                    " of different weights; choose a model whose fit takes sample_weight"
+                    f"{type(self.model).__name__} cannot weight its rows, but the library's weights"
+                    " differ; choose a model whose fit takes sample_weight"
                 )
             options["sample_weight"] = weight
         self._constant = float(y[0])

@@ -1,10 +1,9 @@
 """Gaussian-process regression of the success probability (paper III-D).
 
-The kernel is the absolute exponential exp(-sum_i theta_i |d_i|): its distance is the weighted L1
-norm. (A Matern kernel with nu = 1/2 uses the L2 norm and is another model.) It has a kink wherever
-a feature equals that of a training row. The model of the rows is y ~ N(mu 1, C) with
-C = s R(theta) + diag(noise) + tau I, the correlation R, a constant mean mu (its
-generalised-least-squares value), and known noise.
+The kernel is the absolute exponential exp(-sum_i theta_i |d_i|), with the weighted L1 norm (a
+Matern kernel with nu = 1/2 uses the L2 norm). It has a kink wherever a feature equals that of a
+training row. Rows are modelled as y ~ N(mu 1, C) with C = s R(theta) + diag(noise) + tau I, the
+correlation R, a constant mean mu (its generalised-least-squares value), and known noise.
 """
 
 from dataclasses import dataclass, replace
@@ -31,25 +30,24 @@ from lic_drake.seeds import make_generator
 from lic_drake.types import IntVector, Vector
 
 _DESIGN_EFFECTS = (1.0, 2.0, 4.0, 8.0, 16.0)
-# A matrix of that many rows takes half a gigabyte; the search for settings inverts hundreds.
+# A covariance of this size takes 0.5 GB; the search for settings inverts hundreds of matrices.
 _MAX_ROWS = 8000
 _MAX_SETTINGS_ROWS = 1000
 _MAX_SEARCH_ROWS = 300
-# Bounds of theta are per standard deviation of a feature: from nearly linear over all rows to
-# uncorrelated rows.
+# Bounds of theta are per standard deviation of a feature: nearly linear to uncorrelated rows.
 _BOUNDS = {"theta": (1e-3, 10.0), "signal": (1e-4, 4.0), "floor": (1e-6, 0.25)}
 _THETA_STARTS = (0.05, 0.3, 1.5)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Hyperparameters:
-    """The prior and the noise of a process.
+    """Prior and noise of a process.
 
     Attributes:
         theta: Decay of the correlation per unit of each feature, shape (d,).
         signal_variance: Prior variance s of the success probability around its mean.
-        noise_floor: Variance tau of a row beyond binomial noise and smooth surface.
-        reach_variance: Noise variance of a single reach; a row of n reaches has the n-th part.
+        noise_floor: Noise variance tau of a row beyond binomial noise.
+        reach_variance: Noise variance of a single reach; a row of n reaches has 1 / n of it.
     """
 
     theta: Vector
@@ -61,15 +59,14 @@ class Hyperparameters:
 class GaussianProcess(SuccessEstimator):
     """An exact GP with constant mean, L1 kernel and binomial noise, on averaged rows.
 
-    Scales, signal variance and noise floor maximise the marginal likelihood, which assumes that
-    the noise of all reaches is independent. Reaches in one environment are not: a cylinder in the
-    way spoils many of them, and the likelihood reads such luck as surface. So the noise is then
-    multiplied by the factor (the design effect of cluster samples) that best predicts held-out
-    environments. Rows of equal features are averaged first, as the paper's software refused
-    duplicate inputs.
+    Scales, signal variance and noise floor maximise the marginal likelihood, which assumes
+    independent noise. Outcomes in one environment are correlated (one cylinder can block many
+    reaches), and the likelihood would overfit them. The noise is therefore multiplied by the factor
+    (the design effect of cluster sampling) that best predicts held-out environments. Rows of equal
+    features are averaged first, as the paper's software refused duplicate inputs.
 
     Attributes:
-        hyperparameters: Taken as they are; None: `fit` chooses them.
+        hyperparameters: Fixed hyper-parameters; None: `fit` chooses them.
         hyperparameters_: Those in use.
     """
 
@@ -84,8 +81,7 @@ class GaussianProcess(SuccessEstimator):
                 f" {len(rows.X)}; use the estimator 'knn'"
             )
         chosen = self.hyperparameters
-        # The matrices are small, and on a busy machine OpenBLAS threads that wait for each other
-        # made a fit of two seconds take minutes.
+        # On a busy machine OpenBLAS threads waiting for each other turned 2 s into minutes.
         with threadpool_limits(limits=1, user_api="blas"):
             if chosen is None:
                 chosen = _choose_hyperparameters(X, y, weight, selection_folds(groups, len(y)))
@@ -99,19 +95,18 @@ class GaussianProcess(SuccessEstimator):
         return self._posterior.mean(X)
 
     def _value_and_gradient(self, x: Vector) -> tuple[float, Vector]:
-        """Returns value and gradient; at a kink the mean of the gradients on both sides."""
         return self._posterior.mean_and_gradient(x)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Posterior:
-    """The process given m rows.
+    """The process conditioned on m rows.
 
     Attributes:
         X: Features, shape (m, d).
-        hyperparameters: Of the prior and the noise.
+        hyperparameters: Prior and noise.
         prior_mean: Generalised-least-squares mean mu.
-        alpha: C^-1 (rate - mu), shape (m,); C is the covariance of the rows, noise included.
+        alpha: C^-1 (rate - mu), shape (m,).
     """
 
     X: Vector
@@ -125,7 +120,10 @@ class Posterior:
         return self.prior_mean + self.alpha @ (self.hyperparameters.signal_variance * correlation)
 
     def mean_and_gradient(self, x: Vector) -> tuple[float, Vector]:
-        """Returns the posterior mean at x, shape (d,), and its gradient, shape (d,)."""
+        """Returns the posterior mean at x, shape (d,), and its gradient, shape (d,).
+
+        At a kink this is the mean of the one-sided gradients.
+        """
         theta = self.hyperparameters.theta
         difference = x - self.X
         correlation = np.exp(-(np.abs(difference) @ theta))
@@ -135,7 +133,7 @@ class Posterior:
 
 
 def condition(rows: AveragedRows, hyperparameters: Hyperparameters) -> Posterior:
-    """Returns the process given rows of success rates."""
+    """Conditions the process on rows of success rates."""
     correlation = l1_correlation(rows.X, rows.X, hyperparameters.theta)
     covariance = hyperparameters.signal_variance * correlation
     noise = hyperparameters.reach_variance / rows.count + hyperparameters.noise_floor
@@ -144,25 +142,12 @@ def condition(rows: AveragedRows, hyperparameters: Hyperparameters) -> Posterior
     targets = np.column_stack([rows.rate, np.ones(len(rows.rate))])
     weights = cho_solve(factor, targets, check_finite=False)
     prior_mean = float(weights[:, 0].sum() / weights[:, 1].sum())
-    return Posterior(
-        X=rows.X,
-        hyperparameters=hyperparameters,
-        prior_mean=prior_mean,
-        alpha=weights[:, 0] - prior_mean * weights[:, 1],
-    )
+    alpha = weights[:, 0] - prior_mean * weights[:, 1]
+    return Posterior(rows.X, hyperparameters, prior_mean, alpha)
 
 
 def l1_correlation(A: Vector, B: Vector, theta: Vector) -> Vector:
-    """Returns the correlations of rows of A, shape (n, d), with rows of B, shape (m, d).
-
-    Args:
-        A: Feature vectors.
-        B: Feature vectors.
-        theta: Decay per unit of each feature, shape (d,), positive.
-
-    Returns:
-        Shape (n, m).
-    """
+    """Returns correlations (n, m) of rows of A (n, d) and B (m, d), with decay theta (d,)."""
     return np.exp(-cdist(A * theta, B * theta, "cityblock"))
 
 
@@ -174,7 +159,7 @@ def coordinate_distances(X: Vector) -> Vector:
 def negative_log_likelihood(
     log_parameters: Vector, distances: Vector, y: Vector, noise_variance: Vector
 ) -> tuple[float, Vector]:
-    """Returns -log p(y) without its constant, and its gradient.
+    """Returns -log p(y), up to a constant, and its gradient.
 
     Args:
         log_parameters: Logarithms of (theta, s, tau), shape (d + 2,).
@@ -208,13 +193,10 @@ def negative_log_likelihood(
 
 
 def fit_hyperparameters(rows: AveragedRows, reach_variance: float) -> Hyperparameters:
-    """Maximises the marginal likelihood with L-BFGS-B from several starts, within bounds.
+    """Maximises the marginal likelihood with L-BFGS-B from several initial guesses.
 
-    The starts run on at most 300 of the rows; the best result is improved on all of them.
-
-    Args:
-        rows: The rows.
-        reach_variance: Noise variance of a single reach.
+    All are tried on at most 300 of the rows; the best result is refined on all of them.
+    `reach_variance` is the noise variance of a single reach.
     """
     scale = feature_scale(rows.X)
     X, y, noise = rows.X / scale, rows.rate, reach_variance / rows.count
@@ -242,11 +224,10 @@ def fit_hyperparameters(rows: AveragedRows, reach_variance: float) -> Hyperparam
     _, best = min(found, key=lambda pair: pair[0])
     if len(few) < len(X):
         _, best = improve(best, np.arange(len(X)))
-    theta, signal, floor = np.exp(best[:-2]) / scale, np.exp(best[-2]), np.exp(best[-1])
     return Hyperparameters(
-        theta=theta,
-        signal_variance=float(signal),
-        noise_floor=float(floor),
+        theta=np.exp(best[:-2]) / scale,
+        signal_variance=float(np.exp(best[-2])),
+        noise_floor=float(np.exp(best[-1])),
         reach_variance=reach_variance,
     )
 
@@ -254,7 +235,7 @@ def fit_hyperparameters(rows: AveragedRows, reach_variance: float) -> Hyperparam
 def _choose_hyperparameters(
     X: Vector, y: Vector, weight: Vector, fold: IntVector
 ) -> Hyperparameters:
-    """Returns the likeliest hyper-parameters with the best design effect, of 1,000 rows at most."""
+    """Returns the likeliest hyper-parameters with the best design effect, from up to 1,000 rows."""
     rows = average_rows(X, y, weight)
     if len(rows.X) > _MAX_SETTINGS_ROWS:
         order = make_generator("training", "rows for settings").permutation(len(y))

@@ -1,6 +1,6 @@
-"""Local sub-sampling: an estimator fitted to the nearest samples only (paper III-D, [15])."""
+"""Local sub-sampling: estimators fitted to the nearest samples only (paper III-D, [15])."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass
 from itertools import product
@@ -19,11 +19,11 @@ from lic_drake.seeds import make_generator
 from lic_drake.types import BoolVector, IntVector, Vector
 
 _CACHE_SIZE = 64
-# In length scales: all queries in a cell use the local model of the cell's centre.
+# Edge of a cell in length scales; all queries in a cell use the local model of its centre.
 _CELL = 0.5
 _SETTINGS_ROWS = 20_000
 # Candidates for a process: decay over a length scale, and noise variance of a reach relative to
-# the variance of all.
+# the overall variance.
 _DECAYS = (0.06, 0.12, 0.25, 0.5)
 _NOISES = (0.03, 0.12, 0.5, 2.0, 8.0)
 _NUM_TASKS = 20
@@ -31,18 +31,13 @@ _TASK_ROWS = 300
 _TASK_QUERIES = 20
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Neighbourhoods:
-    """The rows of a library in random order, with a distance between their situations.
+    """The n rows of a library in random order, with a distance between their situations.
 
-    Attributes:
-        X: Features, shape (n, d).
-        y: Successes, shape (n,).
-        groups: Environment of each row, shape (n,).
-        weight: How many reaches each row counts as, shape (n,).
-        situation: The part of x that says how near a row is.
-        length_scale: The bandwidths of neighbours that best predict held-out environments,
-            shape (d,).
+    `X` to `weight` are as in `SuccessEstimator.fit`. Distance is Euclidean in `X[:, situation]`
+    divided by `length_scale`, shape (d,): the neighbours' bandwidths that best predict held-out
+    environments.
     """
 
     X: Vector
@@ -57,12 +52,12 @@ class Neighbourhoods:
         return X[..., self.situation] / self.length_scale[self.situation]
 
     def nearest(self, scaled: Vector, size: int, among: BoolVector | None = None) -> IntVector:
-        """Returns the indices of the rows nearest to a situation, shape (size,) or fewer.
+        """Returns the indices of the `size` rows nearest to a situation in length scales.
 
         Args:
-            scaled: The situation in length scales, shape (k,).
-            size: Number of rows.
-            among: Which rows to choose from, shape (n,), by default all.
+            scaled: The situation, shape (k,).
+            size: Maximum number of rows.
+            among: Rows to choose from, shape (n,); all by default.
         """
         rows = np.arange(len(self.X)) if among is None else np.flatnonzero(among)
         distance = np.sum((self.in_scales(self.X[rows]) - scaled) ** 2, axis=1)
@@ -76,16 +71,15 @@ class LocalEstimator(SuccessEstimator):
 
     Distance is measured in the situation, not in the decision: one local model then serves a whole
     optimisation over starts, and value and gradient belong to one smooth function. Where a moving
-    base also moves the situation, a model serves half a length scale, and the estimate jumps
-    slightly between models. Ties are broken at random, lest the order of the library choose
-    environments.
+    base also moves the situation, a model covers half a length scale, and the estimate jumps
+    slightly between models. Ties are broken at random, independently of the order of the library.
 
     Attributes:
         choose: Returns an unfitted model with settings for a library, such as `choose_process`.
-        situation: The part of x that says how near a row is.
+        situation: The part of x by which rows are compared.
         size: Number of rows in a local model.
-        length_scale: See `Neighbourhoods`. None: `fit` chooses them, from 20,000 rows at most.
-        model: The model with its settings. None: `fit` asks `choose`.
+        length_scale: See `Neighbourhoods`. None: chosen by `fit` from 20,000 rows at most.
+        model: The model with its settings. None: `fit` calls `choose`.
     """
 
     def __init__(
@@ -114,14 +108,7 @@ class LocalEstimator(SuccessEstimator):
             fold = selection_folds(known[part], len(y[part]))
             rows = average_rows(X[part], y[part], weight[part])
             scale = select_bandwidths(rows, y[part], weight[part], fold)
-        self._near = Neighbourhoods(
-            X=X,
-            y=y,
-            groups=known,
-            weight=weight,
-            situation=self.situation,
-            length_scale=scale,
-        )
+        self._near = Neighbourhoods(X, y, known, weight, self.situation, scale)
         self.model_ = self.choose(self._near) if self.model is None else self.model
         self._cache: dict[bytes, SuccessEstimator] = {}
 
@@ -131,24 +118,20 @@ class LocalEstimator(SuccessEstimator):
 
     def _values(self, X: Vector) -> Vector:
         values = np.empty(len(X))
-        for cell, members in self._cells_of(X):
-            values[members] = self._local_model(cell)._values(X[members])
+        cells, group = np.unique(self._cell(X), axis=0, return_inverse=True)
+        order = np.argsort(group.ravel(), kind="stable")
+        members = np.split(order, np.cumsum(np.bincount(group.ravel()))[:-1])
+        for cell, part in zip(cells, members, strict=True):
+            values[part] = self._local_model(cell)._values(X[part])
         return values
 
     def _value_and_gradient(self, x: Vector) -> tuple[float, Vector]:
-        """Returns both from the local model; the choice of its rows is not differentiated."""
+        # The choice of the local rows is not differentiated.
         return self._local_model(self._cell(x))._value_and_gradient(x)
 
     def _cell(self, X: Vector) -> Vector:
         """Returns the centres of the queries' cells, shape (..., k), in length scales."""
         return _CELL * np.round(self._near.in_scales(X) / _CELL) + 0.0
-
-    def _cells_of(self, X: Vector) -> Iterator[tuple[Vector, IntVector]]:
-        """Yields each cell that holds any queries, with their indices."""
-        cells, group = np.unique(self._cell(X), axis=0, return_inverse=True)
-        order = np.argsort(group.ravel(), kind="stable")
-        members = np.split(order, np.cumsum(np.bincount(group.ravel()))[:-1])
-        yield from zip(cells, members, strict=True)
 
     def _local_model(self, cell: Vector) -> SuccessEstimator:
         near = self._near
@@ -164,21 +147,18 @@ class LocalEstimator(SuccessEstimator):
 
 
 def choose_neighbours(near: Neighbourhoods) -> NearestNeighbours:
-    """Returns 400 neighbours whose bandwidths are the length scales of the library."""
+    """Returns 400 nearest neighbours with the length scales of the library as bandwidths."""
     return NearestNeighbours(neighbours=400, bandwidth=near.length_scale)
 
 
 def choose_process(near: Neighbourhoods) -> GaussianProcess:
     """Returns a process with the settings that best predict held-out local rows.
 
-    Features keep their scales relative to each other, the length scales. The decay of the
-    correlation and the noise of a reach are those with the least squared error at 20 random
-    situations whose environments are held out, each predicted from the 300 nearest rows of other
-    environments. The marginal likelihood would take repeated outcomes in one environment as
-    independent evidence: on D2 its scales differed a hundredfold between parts of the library.
-
-    Args:
-        near: The library.
+    Features are scaled by the length scales. Decay of the correlation and noise of a reach minimise
+    the squared error at 20 random situations whose environments are held out, each predicted from
+    the 300 nearest rows of other environments. The marginal likelihood would take repeated outcomes
+    in one environment as independent evidence: on D2 its scales differed a hundredfold between
+    parts of the library.
     """
     variance = max(float(np.var(near.y)), 1e-4)
     candidates = [

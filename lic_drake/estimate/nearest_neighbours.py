@@ -17,8 +17,7 @@ from lic_drake.types import BoolVector, IntVector, Vector
 
 _MAX_POINTS = 500
 _SEARCH_NEIGHBOURS = 100
-# Bandwidths in standard deviations of their feature: from the nearest neighbours alone to an
-# uninformative feature.
+# Bandwidths in standard deviations of a feature, from nearest neighbour only to uninformative.
 _SMALLEST, _LARGEST = 0.02, 8.0
 _COMMON = np.geomspace(0.1, 1.6, 9)
 _STEPS = (2.0, 2.0, np.sqrt(2.0))
@@ -28,20 +27,18 @@ _DECIMALS = 9
 class NearestNeighbours(SuccessEstimator):
     """A Gaussian-weighted average over neighbours.
 
-    Neighbours are distinct feature vectors, each with the mean and the number of its reaches:
-    among raw rows a tie at the K-th place would let the order of rows choose environments.
-    Distances d are Euclidean in features divided by their bandwidths, weights exp(-d^2 / 2).
-    Where neighbours are sparse the estimate is overconfident: of the PR2's starts with estimates
-    from 0.8 to 1 (mean 0.87) 0.62 succeeded.
+    Neighbours are distinct feature vectors, each with the mean and number of its reaches. Distances
+    d are Euclidean in features divided by their bandwidths, weights exp(-d^2 / 2). Where
+    neighbours are sparse the estimate is overconfident: of the PR2's starts with estimates from 0.8
+    to 1 (mean 0.87) 0.62 succeeded.
 
     Attributes:
         neighbours: K, the number of distinct feature vectors averaged.
         bandwidth: Standard deviation of the weights along each feature, shape (d,), in its unit.
-            None: `fit` takes the bandwidths that best predict held-out environments.
-        held_out: Matrix A, shape (k, d). If given, rows with equal A x are held out together
-            instead of environments, for a library that repeats each pair of goal and start in
-            several environments: the pair is then still among the other folds, and bandwidths that
-            see nothing but the pair itself would win.
+            None: those that best predict held-out environments.
+        held_out: Matrix A, shape (k, d), or None. Rows with equal A x are held out together instead
+            of environments. Needed where a library repeats each (goal, start) pair in several
+            environments: copies of the pair in other folds would favour tiny bandwidths.
         bandwidth_: The bandwidths in use.
     """
 
@@ -80,10 +77,10 @@ class NearestNeighbours(SuccessEstimator):
         distance, index = query_neighbours(self._tree, X / self.bandwidth_, self.neighbours)
         weight = gaussian_weights(distance) * self._count[index]
         values = np.sum(weight * self._rate[index], axis=1) / weight.sum(axis=1)
-        return np.clip(values, 0.0, 1.0)  # It leaves [0, 1] by rounding only.
+        return np.clip(values, 0.0, 1.0)  # Outside [0, 1] by rounding only.
 
     def _value_and_gradient(self, x: Vector) -> tuple[float, Vector]:
-        """Returns both for the neighbours at hand; the estimate jumps where these change."""
+        # For a fixed set of neighbours; the estimate jumps where the set changes.
         query = x / self.bandwidth_
         distance, index = query_neighbours(self._tree, query, self.neighbours)
         weight = gaussian_weights(distance) * self._count[index]
@@ -95,38 +92,24 @@ class NearestNeighbours(SuccessEstimator):
 
 
 def query_neighbours(tree: cKDTree, queries: Vector, neighbours: int) -> tuple[Vector, IntVector]:
-    """Returns distances and indices of the nearest points, shape (..., k), nearest first.
-
-    k is `neighbours`, or the number of points if there are fewer.
-    """
-    k = min(neighbours, tree.n)
-    distance, index = tree.query(queries, k=k)
-    if k == 1:  # The tree then leaves out the axis of neighbours.
-        return np.expand_dims(distance, -1), np.expand_dims(index, -1)
-    return distance, index
+    """Returns distances and indices of up to `neighbours` points, shape (..., k), nearest first."""
+    return tree.query(queries, k=range(1, min(neighbours, tree.n) + 1))
 
 
 def gaussian_weights(distance: Vector) -> Vector:
-    """Returns exp(-d^2 / 2) relative to the nearest, so that not all of them underflow.
-
-    Args:
-        distance: Distances d in bandwidths, shape (..., k), the nearest first.
-    """
-    nearest = distance[..., :1]
-    return np.exp(-0.5 * (distance**2 - nearest**2))
+    """Returns exp(-d^2 / 2), scaled to avoid underflow, of distances (..., k), nearest first."""
+    return np.exp(-0.5 * (distance**2 - distance[..., :1] ** 2))
 
 
 def select_bandwidths(rows: AveragedRows, y: Vector, weight: Vector, fold: IntVector) -> Vector:
     """Returns the bandwidth of each feature, shape (d,), from a coordinate-wise search.
 
-    It minimises the squared error in held-out folds, at 500 points at most and with 100
-    neighbours. A common bandwidth in standard deviations would average too much along some
-    features, such as a start's orientation, and too little along others.
+    It minimises the squared error in held-out folds, at 500 points at most and with 100 neighbours.
 
     Args:
         rows: The distinct points.
         y: Success of each reach, shape (n,).
-        weight: How many reaches each counts as, shape (n,).
+        weight: Number of reaches that each counts as, shape (n,).
         fold: Fold of each reach, shape (n,).
     """
     scale = feature_scale(rows.X)
@@ -140,7 +123,7 @@ def select_bandwidths(rows: AveragedRows, y: Vector, weight: Vector, fold: IntVe
 def _improve(
     error: Callable[[Vector], float], bandwidth: Vector, scale: Vector, varies: BoolVector
 ) -> Vector:
-    """Returns bandwidths after a search along each varying feature, with shrinking steps."""
+    """Refines bandwidths along each varying feature, with shrinking steps."""
     least = error(bandwidth)
     for step in _STEPS:
         for feature in np.flatnonzero(varies):
@@ -158,14 +141,14 @@ def _improve(
 def _held_out_error(
     rows: AveragedRows, y: Vector, weight: Vector, fold: IntVector
 ) -> Callable[[Vector], float]:
-    """Returns the squared error as a function of the bandwidths."""
+    """Returns the held-out squared error as a function of the bandwidths."""
     # Numbers of reaches and of successes, each of shape (points, folds).
     shape = (len(rows.X), int(fold.max()) + 1)
     cell = np.ravel_multi_index((rows.member, fold), shape)
     size = shape[0] * shape[1]
     tries = np.bincount(cell, weights=weight, minlength=size).reshape(shape)
     successes = np.bincount(cell, weights=weight * y, minlength=size).reshape(shape)
-    # What each fold is predicted from: everything but itself.
+    # Each fold is predicted from all others.
     seen_tries = tries.sum(axis=1, keepdims=True) - tries
     seen_successes = successes.sum(axis=1, keepdims=True) - successes
     rate = seen_successes.sum() / seen_tries.sum()
@@ -185,7 +168,7 @@ def _held_out_error(
             shape=(len(tried), len(points)),
         )
         total = kernel @ seen_tries
-        # Where a fold holds all neighbours, the rate of the other folds is all there is.
+        # Where all neighbours are held out, predict the overall rate.
         known = total > 0.0
         predicted = np.where(known, kernel @ seen_successes / np.where(known, total, 1.0), rate)
         return float(np.sum(hits * (1.0 - predicted) ** 2 + misses * predicted**2))

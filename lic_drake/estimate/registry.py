@@ -1,4 +1,4 @@
-"""The success estimators by name. A new one is a file of your own with `register_estimator`."""
+"""Registry of success estimators; user code adds one with `register_estimator`."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING
@@ -7,61 +7,54 @@ from lic_drake.errors import EstimateError
 from lic_drake.estimate.features import PLANAR_LIC1, FeatureMap
 from lic_drake.registry import Registry
 
-if TYPE_CHECKING:  # Names must be quick to list; scikit-learn takes most of a second to import.
+if TYPE_CHECKING:  # Listing names must not import scikit-learn, which takes most of a second.
     from lic_drake.estimate.estimator import SuccessEstimator
 
 EstimatorFactory = Callable[[FeatureMap], "SuccessEstimator"]
-"""Returns a new, unfitted estimator for features of this meaning."""
+"""Returns a new, unfitted estimator for a feature map."""
 
 _ESTIMATORS: Registry[EstimatorFactory] = Registry("estimator", EstimateError)
 
-_RESERVED = ("rnd", "cost")  # Methods of selection without an estimator.
+_RESERVED = ("rnd", "cost")  # Selection methods without an estimator.
 
 
 def register_estimator(name: str, factory: EstimatorFactory) -> None:
-    """Registers an estimator under a name, which is then a method of selection, too.
+    """Registers an estimator under a name, which is then also a selection method.
 
     Args:
-        name: What the command line calls it.
+        name: Its name on the command line.
         factory: Returns a new, unfitted `SuccessEstimator` for a feature map.
 
     Raises:
-        EstimateError: The name is taken or means another method, or `factory` cannot be called.
+        EstimateError: The name is taken or ambiguous, or `factory` is not callable.
     """
     if not callable(factory):
         raise EstimateError(
-            f"estimator {name!r} needs a function of a feature map that returns it, got"
-            f" {factory!r}; register the class or a lambda, not the estimator"
+            f"estimator {name!r} needs a function of a feature map, got {factory!r}; register a"
+            " factory, not the estimator"
         )
     twins = (f"{name}1", name[:-1] if name.endswith("1") else None)
     if name in _RESERVED or any(twin in _ESTIMATORS.entries for twin in twins):
-        raise EstimateError(
-            f"{name!r} cannot be the name of an estimator, as it would mean two methods; choose"
-            " another name"
-        )
+        raise EstimateError(f"{name!r} would name two selection methods; choose another name")
     _ESTIMATORS.register(name, factory)
 
 
 def make_estimator(name: str, features: FeatureMap = PLANAR_LIC1) -> "SuccessEstimator":
-    """Returns a new, unfitted estimator.
-
-    Args:
-        name: One of `estimator_names`.
-        features: What x means.
+    """Returns a new, unfitted estimator for a feature map.
 
     Raises:
-        EstimateError: The estimator is unknown.
+        EstimateError: The name is unknown, see `estimator_names`.
     """
     return _ESTIMATORS.get(name)(features)
 
 
 def estimator_names() -> tuple[str, ...]:
-    """Returns the names of all known estimators, the default first."""
+    """Returns the names of all registered estimators, the default first."""
     return _ESTIMATORS.names()
 
 
 def _process(features: FeatureMap) -> "SuccessEstimator":
-    """Uses all rows for LIC-1, and the nearest of LIC-2's many rows."""
+    """Uses all rows for LIC-1, only the nearest for LIC-2, which has many."""
     if features.observed:
         from lic_drake.estimate.local import LocalEstimator, choose_process
 
@@ -72,7 +65,7 @@ def _process(features: FeatureMap) -> "SuccessEstimator":
 
 
 def _neighbours(features: FeatureMap) -> "SuccessEstimator":
-    """Uses all rows for LIC-1, and the nearest of LIC-2's many rows."""
+    """Uses all rows for LIC-1, only the nearest for LIC-2, which has many."""
     if features.observed:
         from lic_drake.estimate.local import LocalEstimator, choose_neighbours
 

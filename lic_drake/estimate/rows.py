@@ -1,4 +1,4 @@
-"""Rows that an estimator learns from: checks, averages over equal rows, and folds."""
+"""Training rows: validation, averages over equal rows, and cross-validation folds."""
 
 from dataclasses import dataclass
 
@@ -11,11 +11,7 @@ from lic_drake.types import IntVector, Vector
 
 
 def check_rows(X: ArrayLike, y: ArrayLike) -> tuple[Vector, Vector]:
-    """Returns training rows as arrays of floats.
-
-    Args:
-        X: Features, shape (n, d).
-        y: Successes, shape (n,), each 0 or 1.
+    """Returns features, shape (n, d), and successes, shape (n,), as arrays of floats.
 
     Raises:
         EstimateError: No rows, mismatched lengths, a NaN or infinity, or a y other than 0 or 1.
@@ -23,23 +19,19 @@ def check_rows(X: ArrayLike, y: ArrayLike) -> tuple[Vector, Vector]:
     X = np.asarray(X, dtype=np.float64)
     y = np.asarray(y, dtype=np.float64)
     if X.ndim != 2 or y.shape != X.shape[:1]:
-        raise EstimateError(
-            f"training rows need shapes X (n, d) and y (n,), got {X.shape} and {y.shape}"
-        )
+        raise EstimateError(f"X and y need shapes (n, d) and (n,), got {X.shape} and {y.shape}")
     if X.size == 0:
         raise EstimateError(f"no training rows: X has shape {X.shape}; collect reaches first")
     unusable = ~np.isfinite(X).all(axis=1)
     if unusable.any():
         raise EstimateError(
-            f"{unusable.sum()} of {len(X)} training rows have a feature that is NaN or infinite,"
-            f" the first is row {np.argmax(unusable)}; leave them out"
+            f"{unusable.sum()} of {len(X)} training rows contain NaN or infinity, the first is row"
+            f" {np.argmax(unusable)}; leave them out"
         )
-    not_binary = (y != 0.0) & (y != 1.0)
-    if not_binary.any():
-        raise EstimateError(
-            f"successes must be 0 or 1, got {y[not_binary][0]} in row {np.argmax(not_binary)}"
-        )
-    # Adding zero turns -0.0 into 0.0: rows are compared by their numbers.
+    wrong = (y != 0.0) & (y != 1.0)
+    if wrong.any():
+        raise EstimateError(f"successes must be 0 or 1, got {y[wrong][0]} in row {wrong.argmax()}")
+    # Adding zero turns -0.0 into 0.0: rows are compared bit by bit.
     return X + 0.0, y
 
 
@@ -47,15 +39,13 @@ def check_weights(sample_weight: ArrayLike | None, num_rows: int) -> Vector:
     """Returns the weight of each row, shape (num_rows,); None means one each.
 
     Raises:
-        EstimateError: Mismatched lengths, or a weight that is not positive and finite.
+        EstimateError: Wrong length, or a weight that is not positive and finite.
     """
     if sample_weight is None:
         return np.ones(num_rows)
     weight = np.asarray(sample_weight, dtype=np.float64)
     if weight.shape != (num_rows,):
-        raise EstimateError(
-            f"sample_weight needs one number for each of {num_rows} rows, got {weight.shape}"
-        )
+        raise EstimateError(f"sample_weight needs one entry a row ({num_rows}), got {weight.shape}")
     if not np.all(np.isfinite(weight) & (weight > 0.0)):
         raise EstimateError(f"weights must be positive numbers, got {np.min(weight)}")
     return weight
@@ -65,7 +55,7 @@ def check_queries(X: ArrayLike, num_features: int) -> Vector:
     """Returns query rows, shape (n, d), as an array of floats.
 
     Raises:
-        EstimateError: Another number of features than d, or a NaN or infinity.
+        EstimateError: Wrong number of features, or a NaN or infinity.
     """
     X = np.asarray(X, dtype=np.float64)
     if X.ndim != 2 or X.shape[1] != num_features:
@@ -86,14 +76,14 @@ def feature_scale(X: Vector) -> Vector:
 class AveragedRows:
     """Distinct feature vectors with their success rates.
 
-    A library tries every (goal, start) pair in many environments. P(success) depends on the pair
-    alone, so nothing is lost if rows of the same pair become one row with a count.
+    P(success) depends on the (goal, start) pair alone, so rows of the same pair can be merged into
+    one row with a count without loss.
 
     Attributes:
         X: Features, shape (m, d), in lexicographic order.
-        rate: Share of successes, shape (m,).
-        count: Number of reaches, or the sum of their weights, shape (m,).
-        member: For each reach its index among the m, shape (n,).
+        rate: Success rate, shape (m,).
+        count: Sum of the reaches' weights, shape (m,).
+        member: Index of each reach's pair, shape (n,).
     """
 
     X: Vector
@@ -103,13 +93,7 @@ class AveragedRows:
 
 
 def average_rows(X: Vector, y: Vector, weight: Vector | None = None) -> AveragedRows:
-    """Averages y over equal rows of X.
-
-    Args:
-        X: Features, shape (n, d).
-        y: Successes, shape (n,).
-        weight: How many reaches each row counts as, shape (n,); one by default.
-    """
+    """Averages y, shape (n,), over equal rows of X, shape (n, d), by weight, shape (n,)."""
     weight = np.ones(len(X)) if weight is None else weight
     order = np.lexsort(X.T[::-1])
     sorted_X = X[order]
@@ -125,11 +109,9 @@ def average_rows(X: Vector, y: Vector, weight: Vector | None = None) -> Averaged
 def reach_variance(rows: AveragedRows) -> float:
     """Returns the mean binomial variance p (1 - p) of one reach around its pair's rate.
 
-    It is the pooled variance within rows, so that a row of n reaches has the noise
-    reach_variance / n. One variance serves all rows: with p (1 - p) / n of each row, rows that
-    succeeded by luck every time would count as the most certain. One pseudo-reach with the
-    variance of all reaches together keeps it above zero, and is all there is where no pair was
-    tried twice.
+    This is the pooled within-row variance; a row of n reaches has the noise variance
+    reach_variance / n. Per-row estimates p (1 - p) / n would treat pairs that succeeded every time
+    by luck as the most certain. One pseudo-reach with the overall variance keeps it positive.
     """
     num_reaches = rows.count.sum()
     total_rate = (rows.count @ rows.rate + 0.5) / (num_reaches + 1.0)
@@ -139,16 +121,11 @@ def reach_variance(rows: AveragedRows) -> float:
 
 
 def group_folds(groups: ArrayLike, max_folds: int) -> IntVector:
-    """Assigns rows to folds such that no group is in two of them.
-
-    Reaches in one environment share its luck, so that they are one group.
+    """Returns the fold of each row, shape (n,), from 0, with no group split between folds.
 
     Args:
-        groups: Number of each row's group, shape (n,).
+        groups: Group of each row, shape (n,).
         max_folds: Number of folds, fewer if there are fewer groups.
-
-    Returns:
-        Fold of each row, shape (n,), from 0.
 
     Raises:
         EstimateError: Fewer than two folds or groups.
@@ -156,29 +133,27 @@ def group_folds(groups: ArrayLike, max_folds: int) -> IntVector:
     distinct, index = np.unique(np.asarray(groups), return_inverse=True)
     if len(distinct) < 2 or max_folds < 2:
         raise EstimateError(
-            "holding out environments needs 2 or more of them and 2 or more folds,"
-            f" got {len(distinct)} and {max_folds}"
+            f"cross-validation needs 2 or more groups and folds, got {len(distinct)} and"
+            f" {max_folds}"
         )
-    # Shuffled, lest the order of a grid decide which rows share a fold.
+    # Shuffled, so that the order of a grid does not decide which rows share a fold.
     rank = make_generator("training", "folds").permutation(len(distinct))
     return rank[index] % min(max_folds, len(distinct))
 
 
 def selection_folds(groups: ArrayLike | None, num_rows: int, max_folds: int = 5) -> IntVector:
-    """Returns the folds by which an estimator chooses its own settings, shape (num_rows,).
+    """Returns the folds by which an estimator chooses its settings, shape (num_rows,).
 
-    Without groups, or with only one, each row is its own group. A single row is fold 0.
+    Without groups, or with only one, each row is its own group. A single row is in fold 0.
 
     Raises:
-        EstimateError: `groups` has another length than the rows.
+        EstimateError: `groups` has the wrong length.
     """
     rows = np.arange(num_rows)
     if groups is not None:
         given = np.asarray(groups)
         if given.shape != (num_rows,):
-            raise EstimateError(
-                f"groups needs one entry for each of {num_rows} rows, got {given.shape}"
-            )
+            raise EstimateError(f"groups needs one entry a row ({num_rows}), got {given.shape}")
         if np.any(given != given[0]):
             rows = given
     return group_folds(rows, max_folds) if num_rows > 1 else np.zeros(1, dtype=np.intp)

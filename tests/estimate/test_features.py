@@ -46,15 +46,6 @@ def test_a_missing_column_is_named(columns) -> None:
         PLANAR_LIC1.rows(columns)
 
 
-def test_joining_goal_and_start_gives_the_row_of_their_record(columns) -> None:
-    p_WG = [columns[f"goal_{axis}"][0] for axis in "xyz"]
-    x0 = [columns[f"start_{name}"][0] for name in ("x", "y", "phi")]
-    x = PLANAR_LIC1.join(p_WG, x0)
-    np.testing.assert_array_equal(x, PLANAR_LIC1.rows(columns).X[0])
-    np.testing.assert_array_equal(x[PLANAR_LIC1.situation], p_WG[:2])
-    np.testing.assert_array_equal(x[PLANAR_LIC1.decision], x0[1:])
-
-
 @pytest.mark.parametrize(
     ("features", "said"),
     [
@@ -63,8 +54,11 @@ def test_joining_goal_and_start_gives_the_row_of_their_record(columns) -> None:
         ({"goal": ("goal_x", "goal_x"), "start": ("start_y",)}, "each once"),
         ({"observed": ("final_x",)}, "observed features must be some of first_start_x"),
         ({"start": ("start_z", "start_phi")}, "of the plane or of space"),
-        ({"observed": ("first_final_x",), "relative": True}, "relative to the goal"),
-        ({"goal": ("goal_x", "goal_y"), "start": ("start_y",), "relative": True}, "each goal"),
+        ({"observed": ("first_final_x",), "relative": True}, "relative features need"),
+        (
+            {"goal": ("goal_x", "goal_y"), "start": ("start_y",), "relative": True},
+            "each goal column",
+        ),
     ],
 )
 def test_features_that_make_no_sense_are_refused(features, said) -> None:
@@ -92,25 +86,6 @@ def pairs(columns) -> dict[str, np.ndarray]:
     shown = {f"first_{name}": np.array([i + 0.5, -i]) for i, name in enumerate(SHOWN)}
     base = {"base_x": np.array([0.25, 0.0]), "base_y": np.array([-0.5, 1.0])}
     return columns | shown | base
-
-
-def test_the_situation_is_goal_and_observation(pairs) -> None:
-    X = SECOND.rows(pairs).X
-    assert SECOND.names == SECOND.goal + SECOND.observed + SECOND.start
-    assert X[:, SECOND.situation].shape == (2, 9)
-    assert X[:, SECOND.decision].shape == (2, 3)
-
-
-def test_joining_with_an_observation_gives_the_row_of_the_pair(pairs) -> None:
-    b0 = np.array([pairs["base_x"][0], pairs["base_y"][0], 0.0])
-    first = {name: pairs[f"first_{name}"][0] for name in SHOWN}
-    observed = SECOND.observation(first, b0)
-    p_RG = np.array([pairs[f"goal_{axis}"][0] for axis in "xyz"]) - b0
-    x0 = np.array([pairs[f"start_{name}"][0] for name in ("x", "y", "phi")]) - b0
-    np.testing.assert_allclose(SECOND.join(p_RG, x0, observed), SECOND.rows(pairs).X[0])
-    many = SECOND.join(p_RG, np.tile(x0, (4, 2, 1)), observed)
-    assert many.shape == (4, 2, 12)
-    np.testing.assert_allclose(many[3, 1], SECOND.rows(pairs).X[0])
 
 
 def test_a_first_reach_that_never_began_shows_nothing() -> None:
@@ -148,19 +123,6 @@ def pairs_in_space(pairs) -> dict[str, np.ndarray]:
             "torso": np.array([0.2, 0.05]),
         }
     )
-
-
-def test_heights_are_told_from_the_torso_and_rotations_and_velocities_are_not(
-    pairs_in_space,
-) -> None:
-    moved = IN_SPACE.rows(pairs_in_space).X
-    for name in ("base_x", "base_y", "torso"):
-        del pairs_in_space[name]
-    difference = IN_SPACE.rows(pairs_in_space).X - moved
-    b0 = {"x": [0.25, 0.0], "y": [-0.5, 1.0], "z": [0.2, 0.05]}
-    for name, column in zip(IN_SPACE.names, difference.T, strict=True):
-        expected = b0.get(name.rsplit("_", 1)[1], [0.0, 0.0])
-        np.testing.assert_allclose(column, expected, atol=1e-12, err_msg=name)
 
 
 @pytest.mark.parametrize("features", [PLANAR_LIC1, SPACE_LIC1, SECOND, IN_SPACE])

@@ -86,40 +86,6 @@ def test_luck_shared_within_environments_is_not_read_as_surface(world) -> None:
     assert knowing.reach_variance > unknowing.reach_variance
 
 
-def test_conditioning_keeps_hyperparameters_and_takes_the_rows(scattered) -> None:
-    process = GaussianProcess().fit(scattered.X, scattered.y, scattered.groups)
-    part = process.conditioned_on(scattered.X[:20], scattered.y[:20])
-    np.testing.assert_array_equal(part.hyperparameters_.theta, process.hyperparameters_.theta)
-    expected = GaussianProcess(process.hyperparameters_).fit(scattered.X[:20], scattered.y[:20])
-    x = scattered.X[30]
-    assert part.value_and_gradient(x)[0] == expected.value_and_gradient(x)[0]
-    assert part.value_and_gradient(x)[0] != process.value_and_gradient(x)[0]
-
-
-def test_a_weight_counts_as_that_many_equal_reaches(scattered) -> None:
-    X, y, groups = scattered.X, scattered.y, scattered.groups
-    count = np.arange(60) % 3 + 1
-    weighted = GaussianProcess().fit(X, y, groups, count)
-    repeated = GaussianProcess().fit(*(np.repeat(part, count, axis=0) for part in (X, y, groups)))
-    np.testing.assert_allclose(weighted.values(X + 0.02), repeated.values(X + 0.02), atol=1e-6)
-
-
-def test_a_single_row_gives_a_flat_estimate() -> None:
-    process = GaussianProcess().fit([[0.5, 0.0, 0.1, 1.0]], [1])
-    value, gradient = process.value_and_gradient([0.6, 0.1, 0.0, 0.5])
-    assert value == pytest.approx(1.0)
-    np.testing.assert_allclose(gradient, 0.0, atol=1e-12)
-
-
-def test_a_feature_that_never_varies_has_no_influence() -> None:
-    rng = np.random.default_rng(0)
-    varying = rng.uniform(size=(40, 1))
-    y = (varying[:, 0] > 0.5).astype(float)
-    process = GaussianProcess().fit(np.column_stack([np.full(40, 0.335), varying]), y)
-    low, high = process.values([[0.335, 0.1], [0.335, 0.9]])
-    assert low < 0.3 < 0.7 < high
-
-
 def test_settings_of_many_rows_come_from_a_part_and_the_estimate_from_all(world) -> None:
     rng = np.random.default_rng(0)
     low, high = [0.4, -0.4, -0.4, -1.0], [0.8, 0.4, 0.4, 1.5]

@@ -71,30 +71,6 @@ def test_models_are_shared_by_all_starts_of_a_situation_and_half_a_length_scale(
     assert 2 < len(GIVEN) <= 3 + 0.8 / (0.5 * local._near.length_scale[1])
 
 
-def test_fitting_again_and_conditioning_forget_local_models_of_old_rows(world) -> None:
-    library = world.library(environments=1)
-    local = LocalEstimator(choose, SITUATION, size=100).fit(library.X, library.y)
-    x = np.array([0.5, 0.1, 0.0, 1.0])
-    before = local.value_and_gradient(x)[0]
-    other = local.conditioned_on(library.X, 1.0 - library.y)
-    assert other._near.length_scale is not None
-    np.testing.assert_array_equal(other._near.length_scale, local._near.length_scale)
-    assert other.value_and_gradient(x)[0] == pytest.approx(1.0 - before)
-    local.fit(library.X, 1.0 - library.y)
-    assert local.value_and_gradient(x)[0] == pytest.approx(1.0 - before)
-
-
-def test_many_goals_keep_memory_bounded_and_answers_right(world) -> None:
-    library = world.library(environments=1)
-    local = LocalEstimator(choose, SITUATION, size=50).fit(library.X, library.y)
-    x, y = np.meshgrid(np.linspace(0.4, 0.8, 20), np.linspace(-0.4, 0.4, 20))
-    queries = np.column_stack([x.ravel(), y.ravel(), np.zeros((400, 2))])
-    together = local.values(queries)
-    assert len(local._cache) <= 64
-    alone = [local.values(query[None])[0] for query in queries]
-    np.testing.assert_allclose(together, alone)
-
-
 def test_a_library_below_the_size_is_used_as_a_whole_with_its_weights(scattered) -> None:
     local = LocalEstimator(choose, SITUATION, size=60)
     weight = np.repeat([1.0, 3.0], [40, 20])
@@ -116,16 +92,6 @@ def test_rows_at_equal_distance_come_from_all_environments(world) -> None:
     np.testing.assert_array_equal(GIVEN[0][0], near.X[rows])
 
 
-def test_rows_can_be_chosen_among_some(scattered) -> None:
-    near = LocalEstimator(choose, SITUATION).fit(scattered.X, scattered.y, scattered.groups)._near
-    among = near.groups == near.groups[0]
-    centre = near.in_scales(near.X[0])
-    distance = np.linalg.norm(near.in_scales(near.X) - centre, axis=1)
-    expected = np.flatnonzero(among)[np.argsort(distance[among])[:3]]
-    assert set(near.nearest(centre, 3, among)) == set(expected)
-    np.testing.assert_array_equal(near.nearest(centre, 100, among), np.flatnonzero(among))
-
-
 def test_a_size_that_makes_no_sense_is_refused(scattered) -> None:
     with pytest.raises(EstimateError, match="size 1"):
         LocalEstimator(choose, SITUATION, size=1).fit(scattered.X, scattered.y)
@@ -144,13 +110,6 @@ def _near(X, y, groups, length_scale) -> Neighbourhoods:
         situation=SITUATION,
         length_scale=np.asarray(length_scale),
     )
-
-
-def test_scales_relative_to_each_other_are_those_of_the_neighbourhoods(scattered) -> None:
-    length_scale = np.array([0.1, 0.2, 0.05, 0.4])
-    process = choose_process(_near(scattered.X, scattered.y, scattered.groups, length_scale))
-    decay = process.hyperparameters.theta * length_scale
-    np.testing.assert_allclose(decay, decay[0])
 
 
 def test_a_surface_without_chance_gets_less_noise_than_coin_tosses(world) -> None:

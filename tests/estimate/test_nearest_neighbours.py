@@ -26,16 +26,6 @@ def test_values_equal_those_of_scikit_learn_on_distinct_rows(scattered, neighbou
     np.testing.assert_allclose(ours.values(queries), expected, rtol=1e-9, atol=1e-12)
 
 
-def test_repeated_rows_count_as_one_neighbour_each_time(world) -> None:
-    library = world.library(environments=5)
-    grid = world.grid()
-    theirs = KNeighborsRegressor(5 * 40, weights=_gaussian)
-    theirs.fit(library.X / BANDWIDTH, library.y)
-    ours = NearestNeighbours(40, BANDWIDTH).fit(library.X, library.y)
-    queries = np.random.default_rng(1).uniform(grid.min(axis=0), grid.max(axis=0), (30, 4))
-    np.testing.assert_allclose(ours.values(queries), theirs.predict(queries / BANDWIDTH), rtol=1e-9)
-
-
 def test_conditioning_keeps_bandwidths_and_weights_multiply_the_kernel(scattered) -> None:
     ours = NearestNeighbours(500).fit(scattered.X[:40], scattered.y[:40], scattered.groups[:40])
     weight = np.linspace(0.1, 5.0, 60)
@@ -57,11 +47,6 @@ def test_a_weight_counts_as_that_many_equal_reaches(scattered) -> None:
     np.testing.assert_allclose(weighted.values(X), repeated.values(X), rtol=1e-9)
 
 
-def test_far_from_all_rows_the_nearest_decide() -> None:
-    ours = NearestNeighbours(bandwidth=[0.005]).fit([[0.0], [1.0]], [0, 1])
-    np.testing.assert_array_equal(ours.values([[-50.0], [50.0]]), [0.0, 1.0])
-
-
 @settings(max_examples=50)
 @given(st.integers(0, 10_000), st.sampled_from([5, 100]))
 def test_the_gradient_equals_finite_differences(seed: int, neighbours: int) -> None:
@@ -78,16 +63,6 @@ def test_the_gradient_equals_finite_differences(seed: int, neighbours: int) -> N
     numeric = (ours.values(x + h) - ours.values(x - h)) / 2e-6
     np.testing.assert_allclose(gradient * scale, numeric, rtol=1e-4, atol=1e-6)
     assert value == pytest.approx(ours.values([x])[0], abs=1e-12)
-
-
-def test_a_rough_surface_gets_a_smaller_bandwidth_than_a_flat_one() -> None:
-    rng = np.random.default_rng(0)
-    X = rng.uniform(size=(2000, 1))
-    groups = np.arange(2000) % 10
-    rough = rng.random(2000) < 0.5 + 0.45 * np.sign(np.sin(40.0 * X[:, 0]))
-    flat = rng.random(2000) < 0.5
-    bandwidths = [NearestNeighbours().fit(X, y, groups).bandwidth_[0] for y in (rough, flat)]
-    assert bandwidths[0] < 0.5 * bandwidths[1]
 
 
 def test_luck_shared_within_environments_widens_the_bandwidth(world) -> None:
@@ -120,19 +95,6 @@ def test_holding_out_goals_reaches_beyond_the_pairs_that_every_environment_repea
     truth = np.abs(new[:, 0]) < 0.2
     loss = [np.mean((e.values(new) - truth) ** 2) for e in (by_environment, by_goal)]
     assert loss[1] < 0.9 * loss[0]
-
-
-@pytest.mark.parametrize(
-    ("X", "y", "expected"),
-    [
-        ([[0.5, 1.0]], [1], 1.0),
-        ([[0.5, 1.0]] * 4, [1, 0, 0, 0], 0.25),
-    ],
-)
-def test_degenerate_libraries_give_their_rate(X, y, expected) -> None:
-    value, gradient = NearestNeighbours().fit(X, y).value_and_gradient([0.6, 1.5])
-    assert value == pytest.approx(expected)
-    np.testing.assert_allclose(gradient, 0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize(

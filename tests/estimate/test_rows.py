@@ -23,7 +23,7 @@ from lic_drake.estimate.rows import (
     [
         (np.zeros((0, 4)), np.zeros(0), r"no training rows.*\(0, 4\).*collect"),
         (np.zeros((2, 4)), np.zeros(3), r"\(2, 4\) and \(3,\)"),
-        ([[0.0, 1.0], [np.nan, 0.0]], [0, 1], r"1 of 2 .*NaN or infinite.* row 1"),
+        ([[0.0, 1.0], [np.nan, 0.0]], [0, 1], r"1 of 2 .*NaN or infinity.* row 1"),
         ([[0.0], [1.0]], [0, 0.5], r"0 or 1, got 0.5 in row 1"),
     ],
 )
@@ -46,7 +46,7 @@ def test_unusable_queries_are_refused(X) -> None:
 
 def test_weights_are_one_by_default_and_positive() -> None:
     assert check_weights(None, 3).tolist() == [1.0, 1.0, 1.0]
-    with pytest.raises(EstimateError, match="one number for each of 3 rows"):
+    with pytest.raises(EstimateError, match="one entry a row"):
         check_weights(np.ones(2), 3)
     with pytest.raises(EstimateError, match="positive numbers, got 0"):
         check_weights([1.0, 0.0], 2)
@@ -114,5 +114,5 @@ def test_without_groups_single_rows_are_spread_over_the_folds() -> None:
         # The order of a grid does not decide the folds.
         assert set(fold[::5]) == set(range(5))
     assert selection_folds(None, 1).tolist() == [0]
-    with pytest.raises(EstimateError, match=r"each of 3 rows, got \(2,\)"):
+    with pytest.raises(EstimateError, match=r"a row .3., got \(2,\)"):
         selection_folds([0, 1], 3)
