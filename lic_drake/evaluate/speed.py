@@ -17,7 +17,6 @@ from lic_drake.reach.session import run_reach
 
 PARTS = {
     "control/tactile": "sensor",
-    "control/surface_taxels": "sensor",
     "control/taxels": "sensor",
     "control/": "mpc",
     "scene/": "build",
