@@ -1,6 +1,6 @@
 """`Arm`: a robot arm with an impedance controller and a tactile skin, from a model file."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import cast
 
@@ -21,7 +21,7 @@ from pydrake.multibody.tree import (
 from pydrake.systems.framework import Context
 
 from lic_drake.errors import ScenarioError
-from lic_drake.robots.kinematics import ArmGeometry, ArmPose, Kinematics, PlantKinematics
+from lic_drake.robots.kinematics import ArmGeometry, ArmPose, Kinematics
 from lic_drake.robots.skin import read_skin
 from lic_drake.types import IntVector, Vector
 
@@ -50,7 +50,7 @@ class Arm:
             of its base and its torso.
         height_range_m: Lowest and highest position of R along z, metres.
         is_planar: Whether the arm moves in the plane z = 0; hand poses are then (x, y, phi).
-        kinematics: Makes kinematics in closed form; by default they come from the model.
+        kinematics: A class that knows some of the kinematics in closed form.
 
     Attributes:
         link_names: Names of the bodies that carry skin.
@@ -62,8 +62,6 @@ class Arm:
         p_RS: The first joint, about which the whole arm turns, shape (3,), metres.
         reach_m: Upper bound of the tip's distance from it, metres.
         kinematics: See `calc_pose`, `solve_ik` and `solve_pointing`.
-        b0_index: Indices of b0 among the positions of a mobile arm, shape (3,).
-        q_index: Indices of the joint angles among them, shape (m,).
 
     Raises:
         ScenarioError: The model cannot be read or is not such an arm.
@@ -83,7 +81,7 @@ class Arm:
         carriage: tuple[str, str, str] | None = None,
         height_range_m: tuple[float, float] = (-np.inf, np.inf),
         is_planar: bool = False,
-        kinematics: Callable[[ArmGeometry], Kinematics] | None = None,
+        kinematics: type[Kinematics] = Kinematics,
     ) -> None:
         self.name = name
         self.is_planar = is_planar
@@ -219,7 +217,7 @@ class Arm:
         scene_graph: SceneGraph,
         skin_links: Sequence[str] | None,
         limits: tuple[Vector | None, Vector | None],
-        kinematics: Callable[[ArmGeometry], Kinematics] | None,
+        kinematics: type[Kinematics],
     ) -> None:
         """Takes everything but names from the model.
 
@@ -281,32 +279,10 @@ class Arm:
         p_RJ = np.array([frame.CalcPoseInWorld(context).translation() for frame in frames])
         self.p_RS = p_RJ[0]
         self.reach_m = float(np.linalg.norm(np.diff(p_RJ, axis=0), axis=1).sum())
-        self.b0_index, self.q_index = np.arange(3), np.arange(3, 3 + len(joints))
         geometry = ArmGeometry(
             is_planar=self.is_planar, q_min=self.q_min, q_max=self.q_max, p_RJ=p_RJ
         )
-        numerical = PlantKinematics(geometry, plant, [link.body_frame() for link in links], tip)
-        self.kinematics: Kinematics = numerical
-        if kinematics is not None:
-            self.kinematics = kinematics(geometry)
-            _compare(self.kinematics, numerical)
-
-
-def _compare(closed_form: Kinematics, numerical: Kinematics) -> None:
-    """Checks kinematics in closed form against the model.
-
-    Raises:
-        ValueError: They differ.
-    """
-    q = closed_form.q_min + 0.37 * (closed_form.q_max - closed_form.q_min)
-    for field, ours, models in zip(
-        ArmPose._fields, closed_form.calc_pose(q), numerical.calc_pose(q), strict=True
-    ):
-        if not np.allclose(ours, models, atol=1e-6):
-            raise ValueError(
-                f"at q = {np.round(q, 3)} rad its {field} is {np.round(models, 4).tolist()}, where"
-                f" the closed form has {np.round(ours, 4).tolist()}"
-            )
+        self.kinematics = kinematics(geometry, plant, [link.body_frame() for link in links], tip)
 
 
 def _parse(plant: MultibodyPlant, model: str | Path) -> list[ModelInstanceIndex]:

@@ -1,4 +1,4 @@
-"""Kinematics of a serial arm: numerical by default; closed forms override single methods.
+"""Kinematics of a serial arm from its model, numerical inverse kinematics included.
 
 Frame R is the arm's base frame, which b0 carries; frame E is the tip, which points along Ex. A hand
 pose x0 is (x, y, phi) for an arm in the plane, else position and quaternion (w, x, y, z) of E.
@@ -85,15 +85,52 @@ class ArmGeometry:
 
 
 class Kinematics:
-    """Forward and inverse kinematics; subclasses give `calc_pose` and may override the rest."""
+    """Kinematics of an arm from its model; subclasses override what they know in closed form.
 
-    def __init__(self, arm: ArmGeometry) -> None:
+    Attributes:
+        arm: The arm's geometry.
+        q_min: Lower joint limits, shape (m,), radians.
+        q_max: Upper joint limits, shape (m,), radians.
+    """
+
+    def __init__(
+        self, arm: ArmGeometry, plant: MultibodyPlant, links: Sequence[Frame], tip: Frame
+    ) -> None:
+        """Sets up kinematics.
+
+        Args:
+            arm: The arm's geometry.
+            plant: A plant with the arm alone, whose positions are q and whose world frame is R.
+            links: Frames of the skin links.
+            tip: Frame E.
+        """
         self.arm = arm
         self.q_min, self.q_max = arm.q_min, arm.q_max
+        self._plant, self._links, self._tip = plant, links, tip
+        self._context = plant.CreateDefaultContext()
 
     def calc_pose(self, q: Vector) -> ArmPose:
         """Returns the arm's pose at joint angles q, shape (m,), radians."""
-        raise NotImplementedError
+        plant, context, world = self._plant, self._context, self._plant.world_frame()
+        plant.SetPositions(context, q)
+        X_RL = [link.CalcPoseInWorld(context) for link in self._links]
+        X_RE = self._tip.CalcPoseInWorld(context)
+        J = plant.CalcJacobianSpatialVelocity(
+            context, JacobianWrtVariable.kV, self._tip, np.zeros(3), world, world
+        )
+        p_RE, Jw_E, Jv_E = X_RE.translation(), J[:3], J[3:]
+        return frozen(
+            ArmPose(
+                R_RL=np.array([X.rotation().matrix() for X in X_RL]),
+                p_RL=np.array([X.translation() for X in X_RL]),
+                p_RE=p_RE,
+                R_RE=X_RE.rotation().matrix(),
+                Jv_E=Jv_E,
+                Jw_E=Jw_E,
+                turn=cross_matrix(Jw_E),
+                moment=np.cross(Jw_E, p_RE, axisa=0, axisc=0) - Jv_E,
+            )
+        )
 
     def tip_pose(self, q: Vector) -> Vector:
         """Returns x0: (x, y, phi) with phi in [-pi, pi), or p_RE and quaternion with w >= 0."""
@@ -197,47 +234,6 @@ class Kinematics:
                 step *= min(1.0, _LARGEST_STEP / max(np.abs(step).max(), 1e-12))
                 q = np.clip(q + step, self.q_min, self.q_max)
         return np.array(found).reshape(-1, len(self.q_min))
-
-
-class PlantKinematics(Kinematics):
-    """Forward kinematics from a Drake plant with the arm alone in it.
-
-    Args:
-        arm: The arm's geometry.
-        plant: The plant, whose positions are the joint angles; its world frame is R.
-        links: Frames of the skin links.
-        tip: Frame E.
-    """
-
-    def __init__(
-        self, arm: ArmGeometry, plant: MultibodyPlant, links: Sequence[Frame], tip: Frame
-    ) -> None:
-        super().__init__(arm)
-        self._plant, self._links, self._tip = plant, links, tip
-        self._context = plant.CreateDefaultContext()
-
-    def calc_pose(self, q: Vector) -> ArmPose:
-        """Returns the arm's pose at joint angles q, shape (m,), radians."""
-        plant, context, world = self._plant, self._context, self._plant.world_frame()
-        plant.SetPositions(context, q)
-        X_RL = [link.CalcPoseInWorld(context) for link in self._links]
-        X_RE = self._tip.CalcPoseInWorld(context)
-        J = plant.CalcJacobianSpatialVelocity(
-            context, JacobianWrtVariable.kV, self._tip, np.zeros(3), world, world
-        )
-        p_RE, Jw_E, Jv_E = X_RE.translation(), J[:3], J[3:]
-        return frozen(
-            ArmPose(
-                R_RL=np.array([X.rotation().matrix() for X in X_RL]),
-                p_RL=np.array([X.translation() for X in X_RL]),
-                p_RE=p_RE,
-                R_RE=X_RE.rotation().matrix(),
-                Jv_E=Jv_E,
-                Jw_E=Jw_E,
-                turn=cross_matrix(Jw_E),
-                moment=np.cross(Jw_E, p_RE, axisa=0, axisc=0) - Jv_E,
-            )
-        )
 
 
 def frozen(pose: ArmPose) -> ArmPose:

@@ -1,10 +1,13 @@
 """Three-link planar arms: the one of the 2-D testbed (paper V-A), or of any other description."""
 
 import math
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
 import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Frame
 
 from lic_drake.paths import models_dir
 from lic_drake.robots.arm import Arm
@@ -26,15 +29,32 @@ _TURN = cross_matrix(_AXES)
 class PlanarKinematics(Kinematics):
     """Closed forms of three joints about +z and links along -y; phi = q1 + q2 + q3 - pi/2.
 
-    The forward kinematics run in the control loop, 15 times as fast as from a plant.
+    The forward kinematics take a fifth of the time of those from the model, in a control loop that
+    is short in the plane.
     """
 
-    def __init__(self, arm: ArmGeometry) -> None:
-        super().__init__(arm)
+    def __init__(
+        self, arm: ArmGeometry, plant: MultibodyPlant, links: Sequence[Frame], tip: Frame
+    ) -> None:
+        """Sets up kinematics, see `Kinematics`.
+
+        Raises:
+            ValueError: The model is another kind of arm.
+        """
+        super().__init__(arm, plant, links, tip)
         if len(arm.q_min) != 3:
             raise ValueError(f"it has {len(arm.q_min)} degrees of freedom, not 3")
         self.link_lengths: Vector = np.linalg.norm(np.diff(arm.p_RJ, axis=0), axis=1)
         self._lengths = tuple(self.link_lengths.tolist())
+        q = np.array([0.3, 0.7, 1.1])
+        for field, ours, models in zip(
+            ArmPose._fields, self.calc_pose(q), super().calc_pose(q), strict=True
+        ):
+            if not np.allclose(ours, models, atol=1e-6):
+                raise ValueError(
+                    f"at q = {q} rad its {field} is {np.round(models, 4).tolist()}, where the"
+                    f" closed form has {np.round(ours, 4).tolist()}"
+                )
 
     def calc_pose(self, q: Vector) -> ArmPose:
         """Returns the arm's pose at joint angles q, shape (3,), radians."""

@@ -8,6 +8,7 @@ import numpy as np
 from lic_drake.errors import ScenarioError
 from lic_drake.paths import models_dir
 from lic_drake.robots.arm import Arm
+from lic_drake.robots.kinematics import Kinematics
 from lic_drake.robots.pr2_kinematics import Pr2Kinematics
 from lic_drake.types import Vector
 
@@ -91,7 +92,7 @@ def make_pr2(heading: float = 0.0, head_tilt_deg: float = 0.0) -> Arm:
         held={"theta": heading} | dict(zip(left, LEFT_ARM_AT_REST, strict=True)),
         carriage=CARRIAGE,
         height_range_m=TORSO_RANGE_M,
-        kinematics=None if heading else Pr2Kinematics,
+        kinematics=Kinematics if heading else Pr2Kinematics,
     )
 
 

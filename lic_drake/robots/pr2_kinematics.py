@@ -1,22 +1,24 @@
-"""Kinematics of the PR2's right arm in closed form, without Drake: they run in the control loop.
+"""Inverse kinematics of the PR2's right arm in closed form.
 
 From the pan axis on the seven joints turn about z, y, x, y, x, y and x of the link they carry, and
 all offsets lie along x: pan axis to shoulder, shoulder to elbow, elbow to wrist, wrist to tool. At
 q = 0 the arm is straight.
 
-Inverse: given where the tool is and which way it points, the wrist is known, and the pan angle
+Given where the tool is and which way it points, the wrist is known, and the pan angle
 alone is free: the distance from shoulder to wrist gives the elbow, two upper arm rolls bring the
 wrist to the right side of the shoulder, the lift to the right height; forearm roll and wrist flex
 then point the tool. Elbow and wrist bend one way only, so every pan angle has at most two
 configurations, and a row of pan angles gives all families of them.
 """
 
-import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Frame
 
-from lic_drake.robots.kinematics import ArmGeometry, ArmPose, Kinematics, keep_limits, rigid_pose
+from lic_drake.robots.kinematics import ArmGeometry, Kinematics, keep_limits, rigid_pose
 from lic_drake.types import IntVector, Vector
 
 NUM_PAN_ANGLES = 271
@@ -30,10 +32,6 @@ _STRAIGHT = 1e-9
 
 _X_R = np.array([1.0, 0.0, 0.0])
 """The x of Eq. (5), from the robot to the clutter."""
-
-_Axis = tuple[float, float, float]
-
-_ZEROS = (0.0,) * 7
 
 
 class ArmLengths(NamedTuple):
@@ -52,89 +50,33 @@ class _Heading(NamedTuple):
     u_S: Vector
 
 
+class _Axes(NamedTuple):
+    """Directions of links, and two axes of the wrist link, at configurations; shapes (n, 3)."""
+
+    forearm: Vector
+    tool: Vector
+    y_6: Vector
+    z_6: Vector
+
+
 class Pr2Kinematics(Kinematics):
-    """Closed forms of the seven joints.
+    """Inverse kinematics of the seven joints in closed form.
 
     Attributes:
         p_RA: Position of the pan axis at the height of the arm, shape (3,), metres.
         lengths: Distances along the arm.
     """
 
-    def __init__(self, arm: ArmGeometry) -> None:
-        super().__init__(arm)
+    def __init__(
+        self, arm: ArmGeometry, plant: MultibodyPlant, links: Sequence[Frame], tip: Frame
+    ) -> None:
+        """Sets up kinematics, see `Kinematics`."""
+        super().__init__(arm, plant, links, tip)
         if len(arm.q_min) != 7:
             raise ValueError(f"it has {len(arm.q_min)} degrees of freedom, not 7")
         self.p_RA = arm.p_RJ[0]
         steps = np.diff(arm.p_RJ[[0, 1, 3, 5, 7]], axis=0)
         self.lengths = ArmLengths(*np.linalg.norm(steps, axis=1).tolist())
-
-    def calc_pose(self, q: Vector) -> ArmPose:
-        """Returns the arm's pose at seven joint angles, radians.
-
-        Scalars, because numpy takes longer to start than these few numbers need.
-        """
-        pan, lift, upper_arm_roll, elbow, forearm_roll, wrist, wrist_roll = q.tolist()
-        shoulder_m, upper_arm_m, forearm_m, tool_m = self.lengths
-        x1: _Axis = (math.cos(pan), math.sin(pan), 0.0)
-        y1: _Axis = (-x1[1], x1[0], 0.0)
-        z1: _Axis = (0.0, 0.0, 1.0)
-        z2, x2 = _turn_axes(z1, x1, lift)
-        y3, z3 = _turn_axes(y1, z2, upper_arm_roll)
-        z4, x4 = _turn_axes(z3, x2, elbow)
-        y5, z5 = _turn_axes(y3, z4, forearm_roll)
-        z6, x6 = _turn_axes(z5, x4, wrist)
-        y7, z7 = _turn_axes(y5, z6, wrist_roll)
-
-        p1: _Axis = tuple(self.p_RA.tolist())
-        p2 = _step(p1, x1, shoulder_m)
-        p4 = _step(p2, x2, upper_arm_m)
-        p6 = _step(p4, x4, forearm_m)
-        p8 = _step(p6, x6, tool_m)
-
-        # One flat array: nested ones take several times as long to make.
-        axes = (z1, y1, x2, y3, x4, y5, x6)
-        points = (p1, p2, p2, p4, p4, p6, p6)
-        ax, ay, az = zip(*axes, strict=True)
-        mx, my, mz = zip(*map(_cross, axes, points), strict=True)
-        back_x, back_y, back_z = [-a for a in ax], [-a for a in ay], [-a for a in az]
-        frames = (
-            *(*x1, *y1, *z1),
-            *(*x2, *y1, *z2),
-            *(*x2, *y3, *z3),
-            *(*x4, *y3, *z4),
-            *(*x4, *y5, *z5),
-            *(*x6, *y5, *z6),
-            *(*x6, *y7, *z7),
-        )
-        crosses = (*_ZEROS, *az, *back_y, *back_z, *_ZEROS, *ax, *ay, *back_x, *_ZEROS)
-        numbers = np.array(
-            (
-                *frames,
-                *(*p1, *p2, *p2, *p4, *p4, *p6, *p6, *p8),
-                *(*ax, *ay, *az),
-                *(*mx, *my, *mz),
-                *crosses,
-            )
-        )
-        numbers.flags.writeable = False  # Shared by all who ask for this configuration.
-        p_RE, moment, turn = (
-            numbers[84:87],
-            numbers[108:129].reshape(3, 7),
-            numbers[129:].reshape(3, 21),
-        )
-        Jv_E = (p_RE @ turn).reshape(3, 7) - moment
-        Jv_E.flags.writeable = False
-        R_RL = numbers[:63].reshape(7, 3, 3).swapaxes(1, 2)
-        return ArmPose(
-            R_RL=R_RL,
-            p_RL=numbers[63:84].reshape(7, 3),
-            p_RE=p_RE,
-            R_RE=R_RL[6],
-            Jv_E=Jv_E,
-            Jw_E=numbers[87:108].reshape(3, 7),
-            turn=turn,
-            moment=moment,
-        )
 
     def solve_ik(self, x0: Vector, near: Vector | None = None) -> Vector:
         """Returns configurations for a tool pose, shape (n, 7); see `Kinematics.solve_ik`.
@@ -162,9 +104,8 @@ class Pr2Kinematics(Kinematics):
             Angles within the limits; those of continuous joints are in [-pi, pi).
         """
         q, _ = self.solve_at(p_RE, R_RE[:, 0], self._pan_angles if pan is None else pan)
-        for row in q:
-            y_6 = self.calc_pose(row).R_RL[5].T @ R_RE[:, 1]
-            row[6] = _wrap(np.arctan2(y_6[2], y_6[1]))
+        axes = _axes(q)
+        q[:, 6] = _wrap(np.arctan2(axes.z_6 @ R_RE[:, 1], axes.y_6 @ R_RE[:, 1]))
         return keep_limits(q, self.q_min, self.q_max)[0]
 
     def solve_pointing(self, p_RE: Vector, u_R: Vector) -> list[Vector]:
@@ -227,20 +168,9 @@ class Pr2Kinematics(Kinematics):
             alpha: Weight of the wrist, positive (the paper does not give it).
             beta: Weight of the elbow, positive (the paper does not give it).
         """
-        pan, lift, upper_arm_roll, elbow, forearm_roll, wrist, _ = q.T[..., None]
-        zero = np.zeros_like(pan)
-        x, y = (
-            np.hstack([np.cos(pan), np.sin(pan), zero]),
-            np.hstack([-np.sin(pan), np.cos(pan), zero]),
-        )
-        z: Vector = np.broadcast_to([0.0, 0.0, 1.0], x.shape)
-        z, upper_arm = _turn(z, x, lift)
-        y, z = _turn(y, z, upper_arm_roll)
-        z, forearm = _turn(z, upper_arm, elbow)
-        y, z = _turn(y, z, forearm_roll)
-        _, tool = _turn(z, forearm, wrist)
-        wrist_to_tool = self.lengths.tool * (tool @ _X_R)
-        elbow_to_tool = wrist_to_tool + self.lengths.forearm * (forearm @ _X_R)
+        axes = _axes(q)
+        wrist_to_tool = self.lengths.tool * (axes.tool @ _X_R)
+        elbow_to_tool = wrist_to_tool + self.lengths.forearm * (axes.forearm @ _X_R)
         return 1.0 / (alpha * np.abs(wrist_to_tool) + beta * np.abs(elbow_to_tool))
 
     def _look_from_shoulder(self, p_RE: Vector, u_R: Vector, pan: Vector) -> _Heading:
@@ -253,6 +183,21 @@ class Pr2Kinematics(Kinematics):
         )
         p_SW[:, 0] -= self.lengths.shoulder
         return _Heading(p_SW, u_S)
+
+
+def _axes(q: Vector) -> _Axes:
+    """Returns axes of the arm at configurations, shape (n, 7)."""
+    pan, lift, upper_arm_roll, elbow, forearm_roll, wrist, _ = q.T[..., None]
+    zero = np.zeros_like(pan)
+    x = np.hstack([np.cos(pan), np.sin(pan), zero])
+    y = np.hstack([-np.sin(pan), np.cos(pan), zero])
+    z: Vector = np.broadcast_to([0.0, 0.0, 1.0], x.shape)
+    z, upper_arm = _turn(z, x, lift)
+    y, z = _turn(y, z, upper_arm_roll)
+    z, forearm = _turn(z, upper_arm, elbow)
+    y, z = _turn(y, z, forearm_roll)
+    z, tool = _turn(z, forearm, wrist)
+    return _Axes(forearm, tool, y, z)
 
 
 def _complete(
@@ -286,22 +231,3 @@ def _turn(u: Vector, v: Vector, angle: Vector) -> tuple[Vector, Vector]:
 def _wrap(angle: Vector) -> Vector:
     """Returns angles wrapped to [-pi, pi), radians."""
     return np.mod(angle + np.pi, 2.0 * np.pi) - np.pi
-
-
-def _turn_axes(u: _Axis, v: _Axis, angle: float) -> tuple[_Axis, _Axis]:
-    """Returns the axes u and v of a frame that has turned about the third one, from u to v."""
-    c, s = math.cos(angle), math.sin(angle)
-    u1, u2, u3 = u
-    v1, v2, v3 = v
-    return (
-        (c * u1 + s * v1, c * u2 + s * v2, c * u3 + s * v3),
-        (c * v1 - s * u1, c * v2 - s * u2, c * v3 - s * u3),
-    )
-
-
-def _step(p: _Axis, u: _Axis, length: float) -> _Axis:
-    return (p[0] + length * u[0], p[1] + length * u[1], p[2] + length * u[2])
-
-
-def _cross(a: _Axis, b: _Axis) -> _Axis:
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])

@@ -98,7 +98,7 @@ class Recording:
         self._springs_back = instance.stems is not None
         self._clock_s = 0.0
         self._b0 = np.array([0.0, 0.0, scenario.task.torso_m])
-        initial = scene.plant.GetDefaultPositions(scene.arm)[scene.robot.q_index]
+        initial = scene.plant.GetDefaultPositions(scene.arm)[3:]
         self._q: Vector = initial if approach is None else approach.waiting
         self._set_up_view()
         if approach is not None:

@@ -147,8 +147,7 @@ def test_r_is_the_given_frame_and_a_mobile_arm_has_b0_among_its_positions(name: 
         p_RE = arm.calc_pose(q).p_RE + (b0 if mobile else 0.0)
         np.testing.assert_allclose(p_WE, X_WR @ p_RE, atol=1e-12)
         assert not plant.is_gravity_enabled(model)
-    np.testing.assert_array_equal(positions[arm.b0_index], b0)
-    np.testing.assert_array_equal(positions[arm.q_index], q)
+    np.testing.assert_array_equal(positions, [*b0, *q])
     assert arm.positions(b0, np.tile(q, (2, 1))).shape == (2, 3 + arm.num_joints)
 
 
