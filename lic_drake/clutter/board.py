@@ -1,35 +1,35 @@
-"""The board with square apertures that stands before clutter in space (paper IV-B, V-B)."""
+"""The board with square apertures, and sphere-aperture-clutter behind it (paper IV-B, V-B)."""
 
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from lic_drake.clutter.instance import ClutterInstance, join, make_objects
+from lic_drake.clutter.placement import place_discs
 from lic_drake.config import check_numbers
 from lic_drake.errors import ScenarioError
 from lic_drake.types import IntVector, Vector
 
 MAX_APERTURES = 20
 """Maximum number of rows or columns of a board."""
+MAX_SPHERES = 1000
+"""Maximum number of spheres; more would be too slow to simulate."""
 
 
 @dataclass(kw_only=True)
 class ApertureBoard:
-    """Parameters of the board; a category with a board inherits them.
+    """Parameters of an upright board across x; size and number of apertures are the paper's."""
 
-    Size and number of the apertures are the paper's.
-    """
-
-    # The board's centre in W, metres; it is upright, across x.
+    # The board's centre in W, metres.
     board_centre: list[float] = field(default_factory=lambda: [0.53, -0.29, 0.89])
     columns: int = 5
     rows: int = 4
     # Distance of neighbouring apertures' centres, and width and thickness of the bars between
-    # them, metres. The bars take their width from the apertures: with centres 0.2 m apart (paper
-    # IV-B) there is no other room, and so do the poles of the authors' planar generator.
+    # them, metres. The bars narrow the apertures, as the poles of the authors' planar generator do:
+    # with centres 0.2 m apart (paper IV-B) there is no other room.
     aperture_m: float = 0.2
     bar_m: float = 0.01
-    # Number of apertures that are blocked, at random.
+    # Number of randomly chosen apertures that are blocked.
     num_blocked: int = 0
 
     def __post_init__(self) -> None:
@@ -45,23 +45,23 @@ class ApertureBoard:
         )
         if self.bar_m >= self.aperture_m:
             raise ScenarioError(
-                f"bars of {self.bar_m} m leave nothing of apertures of {self.aperture_m} m"
+                f"bar_m must be below aperture_m {self.aperture_m}, got {self.bar_m}"
             )
 
     @property
     def board_back_m(self) -> float:
-        """Where the board ends along Wx, metres."""
+        """Position of the board's back along Wx, metres."""
         return self.board_centre[0] + 0.5 * self.bar_m
 
     def aperture_centres(self) -> Vector:
-        """Returns the centres of all apertures, shape (rows * columns, 3); y varies fastest."""
+        """Returns the centres of all apertures, shape (rows * columns, 3), y varying fastest."""
         y = self.aperture_m * (np.arange(self.columns) - 0.5 * (self.columns - 1))
         z = self.aperture_m * (np.arange(self.rows) - 0.5 * (self.rows - 1))
         offsets = np.array([[0.0, yi, zi] for zi in z for yi in y])
         return self.board_centre + offsets
 
     def bare_board(self, material: str = "") -> ClutterInstance:
-        """Returns the bars alone, with every aperture open: what is known beforehand."""
+        """Returns the bars alone, with all apertures open: what is known in advance."""
         a, b = self.aperture_m, self.bar_m
         width, height = self.columns * a, self.rows * a
         upright = [[0.0, a * i - 0.5 * width, 0.0] for i in range(self.columns + 1)]
@@ -72,7 +72,7 @@ class ApertureBoard:
         return replace(bars, p_WA=self.aperture_centres())
 
     def blocked_board(self, blocked: IntVector) -> ClutterInstance:
-        """Returns the board with covers as thick as its bars in some apertures, by index."""
+        """Returns the board with the apertures at these indices covered."""
         p_WA = self.aperture_centres()
         cover = [self.bar_m, self.aperture_m, self.aperture_m]
         return join(
@@ -80,3 +80,47 @@ class ApertureBoard:
             make_objects("box", cover, p_WA[blocked]),
             p_WA=np.delete(p_WA, blocked, axis=0),
         )
+
+
+@dataclass(kw_only=True)
+class SphereApertureClutter(ApertureBoard):
+    """sphere-aperture-clutter: floating spheres behind a board (paper IV-B).
+
+    Number, radius, mass, box and apertures are the paper's. It does not state their distance from
+    the robot: `models/scenarios/sphere-aperture-clutter.yaml` says how that was chosen.
+    """
+
+    num_spheres: int = 40
+    radius_m: float = 0.05
+    mass_kg: float = 0.1
+    # Box for the spheres' centres, (x, y, z) in W, metres.
+    lower: list[float] = field(default_factory=lambda: [0.59, -0.64, 0.69])
+    upper: list[float] = field(default_factory=lambda: [0.78, 0.06, 1.09])
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_numbers(
+            self,
+            positive=["radius_m", "mass_kg"],
+            ranges={"num_spheres": (0, MAX_SPHERES)},
+            vectors={"lower": 3, "upper": 3},
+            ascending=[("lower", "upper")],
+        )
+        if self.lower[0] - self.radius_m < self.board_back_m:
+            raise ScenarioError(
+                f"spheres from x = {self.lower[0] - self.radius_m:.3f} m would overlap the board at"
+                f" {self.board_centre[0]} m; raise lower or move board_centre"
+            )
+
+    def sample(self, rng: np.random.Generator) -> ClutterInstance:
+        """Samples an environment; its spheres do not depend on `num_blocked`.
+
+        Raises:
+            ScenarioError: The spheres do not fit into the box.
+        """
+        n = self.num_spheres
+        centres = place_discs(rng, n, self.lower, self.upper, 2.0 * self.radius_m)
+        spheres = make_objects("sphere", [self.radius_m], centres, mass=self.mass_kg, movable=True)
+        order = rng.permutation(self.rows * self.columns)
+        board = self.blocked_board(np.sort(order[: self.num_blocked]))
+        return join(spheres, board, p_WA=board.p_WA)

@@ -8,10 +8,9 @@ from lic_drake.clutter.instance import ClutterInstance, join, make_objects
 from lic_drake.clutter.placement import place_discs
 from lic_drake.config import check_numbers
 from lic_drake.errors import ScenarioError
-from lic_drake.types import Vector
 
 MAX_OBJECTS = 2000
-"""Maximum number of objects; more would not be simulated in useful time."""
+"""Maximum number of objects; more would be too slow to simulate."""
 MAX_APERTURES = 50
 """Maximum number of openings in a barrier."""
 
@@ -42,7 +41,7 @@ class CylinderClutter:
         )
 
     def sample(self, rng: np.random.Generator) -> ClutterInstance:
-        """Draws one environment: uniform centres, no two cylinders overlapping.
+        """Samples an environment with uniform centres and without overlap.
 
         Raises:
             ScenarioError: The cylinders do not fit into the rectangle.
@@ -60,14 +59,14 @@ class CylinderClutter:
 
 @dataclass(kw_only=True)
 class CylinderApertureClutter(CylinderClutter):
-    """cylinder-aperture-clutter: a barrier with openings stands before the cylinders (Fig. 3c).
+    """cylinder-aperture-clutter: cylinders behind a barrier with openings (Fig. 3c).
 
-    The paper gives neither the barrier's place, nor the number and width of its openings:
+    The paper gives neither the barrier's position, nor the number and width of its openings:
     `models/scenarios/cylinder-aperture-clutter.yaml` says how those were chosen.
     """
 
-    # The barrier's middle line lies at this distance from the base, along y, metres; its length
-    # and thickness, metres (wall width from the authors' simulator).
+    # Position of the barrier's centre line along x, its length along y and its thickness, metres
+    # (wall width from the authors' simulator).
     barrier_x_m: float = 0.335
     barrier_length_m: float = 3.2
     barrier_thickness_m: float = 0.02
@@ -90,37 +89,31 @@ class CylinderApertureClutter(CylinderClutter):
         if max(-low, high) + self.aperture_width_m > 0.5 * self.barrier_length_m:
             raise ScenarioError(
                 f"apertures at y {low} to {high} do not fit into a barrier of"
-                f" {self.barrier_length_m} m; give it a larger barrier_length_m"
+                f" {self.barrier_length_m} m; increase barrier_length_m"
             )
         front = self.lower[0] - self.radius_m
         if front < self.barrier_x_m + 0.5 * self.barrier_thickness_m:
             raise ScenarioError(
-                f"cylinders from x = {front:.3f} m on would stand in the barrier at"
+                f"cylinders from x = {front:.3f} m would overlap the barrier at"
                 f" {self.barrier_x_m} m; raise lower or reduce barrier_x_m"
             )
 
     def sample(self, rng: np.random.Generator) -> ClutterInstance:
-        """Draws cylinders as in cylinder-clutter, and then the openings of the barrier.
-
-        Centres of openings are uniform, none nearer to another than two widths, so that some
-        barrier stands between them.
+        """Samples cylinders as in cylinder-clutter, then uniform openings two widths apart.
 
         Raises:
             ScenarioError: Cylinders or openings do not fit.
         """
         cylinders = super().sample(rng)
-        low = [self.barrier_x_m, self.aperture_y_min_m]
-        high = [self.barrier_x_m, self.aperture_y_max_m]
+        x = self.barrier_x_m
+        low, high = [x, self.aperture_y_min_m], [x, self.aperture_y_max_m]
         centres = place_discs(rng, self.num_apertures, low, high, 2.0 * self.aperture_width_m)
         centres = centres[np.argsort(centres[:, 1])]
         p_WA = np.column_stack([centres, np.zeros(len(centres))])
-        return join(cylinders, self._barrier(centres[:, 1]), p_WA=p_WA)
-
-    def _barrier(self, y: Vector) -> ClutterInstance:
-        """Returns the parts of the barrier between openings centred at y, shape (k,), ascending."""
-        half = 0.5 * self.barrier_length_m
+        # The parts of the barrier between the openings.
+        half, y = 0.5 * self.barrier_length_m, centres[:, 1]
         begin = np.append(-half, y + 0.5 * self.aperture_width_m)
         end = np.append(y - 0.5 * self.aperture_width_m, half)
-        x, thickness = np.full_like(begin, self.barrier_x_m), self.barrier_thickness_m
-        edges = [[thickness, width, self.length_m] for width in end - begin]
-        return make_objects("box", edges, np.column_stack([x, 0.5 * (begin + end)]))
+        edges = [[self.barrier_thickness_m, width, self.length_m] for width in end - begin]
+        p_WB = np.column_stack([np.full_like(begin, x), 0.5 * (begin + end)])
+        return join(cylinders, make_objects("box", edges, p_WB), p_WA=p_WA)

@@ -1,13 +1,12 @@
-"""foliage-aperture-clutter: springy stems with leaves behind a board with apertures (paper V-B)."""
+"""foliage-aperture-clutter: elastic stems with leaves behind a board (paper V-B)."""
 
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from lic_drake.clutter.board import ApertureBoard
-from lic_drake.clutter.instance import ClutterInstance, join, make_objects
+from lic_drake.clutter.instance import ClutterInstance, Stems, join, make_objects
 from lic_drake.clutter.placement import MAX_TRIES, place_discs
-from lic_drake.clutter.stems import Stems
 from lic_drake.config import check_numbers
 from lic_drake.errors import ScenarioError
 from lic_drake.types import BoolVector, Vector
@@ -20,27 +19,26 @@ MAX_LEAVES = 50
 
 @dataclass(kw_only=True)
 class FoliageApertureClutter(ApertureBoard):
-    """Parameters of the category: those of the board and of the foliage behind it.
+    """Parameters of the board and of the foliage behind it.
 
-    The paper shows a bank of artificial foliage (Fig. 1) and gives no number of it:
-    `models/scenarios/foliage-aperture-clutter.yaml` says how they were chosen.
+    The paper shows artificial foliage (Fig. 1) without numbers:
+    `models/scenarios/foliage-aperture-clutter.yaml` says how these were chosen.
     """
 
     num_blocked: int = 6
-    # Number of further apertures with a cover that leaves a part of them open, and the range of
-    # the covered shares.
+    # Number of further, partly covered apertures, and the range of the covered shares.
     num_partly_covered: int = 2
     covered_share: list[float] = field(default_factory=lambda: [0.3, 0.7])
     # Thickness of the covers, metres; they are panels in the middle of the board.
     cover_m: float = 0.01
-    # The box in which everything grows, (x, y, z) in W, metres. Stems are rooted in its floor or
-    # hang from its ceiling, and stay this far within its sides, where there is room for leaves.
+    # The box that contains everything, (x, y, z) in W, metres. Stems are rooted in its floor or
+    # hang from its ceiling, and keep this margin to its sides for their leaves.
     lower: list[float] = field(default_factory=lambda: [0.56, -0.79, 0.43])
     upper: list[float] = field(default_factory=lambda: [0.81, 0.21, 1.35])
     margin_m: float = 0.05
     # Height of the trough that holds the roots, metres.
     trough_m: float = 0.15
-    # Springy stems and fixed branches; the share of both that hangs; distance between roots.
+    # Elastic stems and fixed branches; the share of both that hangs; distance between roots.
     num_stems: int = 40
     num_branches: int = 6
     hanging_share: float = 0.4
@@ -90,26 +88,22 @@ class FoliageApertureClutter(ApertureBoard):
         )
         if self.lower[0] < self.board_back_m:
             raise ScenarioError(
-                f"foliage from x = {self.lower[0]:.3f} m on would grow through the board, whose"
-                f" back is at {self.board_back_m:.3f} m; raise lower or move board_centre"
+                f"foliage from x = {self.lower[0]:.3f} m would overlap the board, whose back is at"
+                f" {self.board_back_m:.3f} m; raise lower or move board_centre"
             )
         width, depth, height = np.subtract(self.upper, self.lower)
         if min(width, depth) <= 2.0 * self.margin_m:
-            raise ScenarioError(
-                f"margins of {self.margin_m} m leave nothing between lower {self.lower} and upper"
-                f" {self.upper}"
-            )
+            raise ScenarioError(f"margin_m {self.margin_m} must be below half of the box's width")
         longest = max(self.stem_length_m[1], self.branch_length_m[1])
         if longest > height:
             raise ScenarioError(
-                f"stems of {longest} m are longer than the box of {height:.3f} m is tall"
+                f"stems of {longest} m are longer than the box is high, {height:.3f} m"
             )
 
     def sample(self, rng: np.random.Generator) -> ClutterInstance:
-        """Draws one environment: the foliage, and then what covers the apertures.
+        """Samples the foliage, and then the covers, on which the foliage does not depend.
 
-        The foliage of an environment does not depend on how many apertures are covered. The
-        apertures of the instance are those that nothing covers.
+        The apertures of the instance are those without a cover.
 
         Raises:
             ScenarioError: The stems do not fit into the box.
@@ -141,8 +135,8 @@ class FoliageApertureClutter(ApertureBoard):
         )
 
     def _covers(self, p_WA: Vector, shares: Vector, hangs: BoolVector) -> ClutterInstance:
-        """Returns covers of shares of apertures; one of a part stands below or hangs above."""
-        # They reach to the middle of a bar.
+        """Returns covers of shares of apertures; partial ones stand below or hang above."""
+        # Covers extend to the middle of a bar.
         clear = self.aperture_m - self.bar_m
         height = np.where(shares < 1.0, shares * clear + 0.5 * self.bar_m, self.aperture_m)
         offset = np.where(hangs, 1.0, -1.0) * (0.5 * (self.aperture_m - height))
@@ -166,7 +160,7 @@ class FoliageApertureClutter(ApertureBoard):
             for stem in zip(p_WH, R_WS, length, strict=True)
             for _ in range(self.leaves_per_stem)
         ]
-        # As stiff at the tip as a cantilever of that rigidity: L^2 / k = L^3 / (3 EI).
+        # The tip stiffness of a cantilever of this rigidity: L^2 / k = L^3 / (3 EI).
         stiffness = 3.0 * self.rigidity_N_m2 / length
         mass = self.stem_kg_per_m * length + self.leaf_kg * self.leaves_per_stem
         damping = 2.0 * self.damping_ratio * np.sqrt(stiffness * (mass * length**2 / 3.0))
@@ -185,7 +179,7 @@ class FoliageApertureClutter(ApertureBoard):
         )
 
     def _slant(self, rng: np.random.Generator, p_WH: Vector, length: float, hangs: bool) -> Vector:
-        """Draws R_WS of a stem whose tip stays within the box."""
+        """Samples R_WS of a stem whose tip lies in the box."""
         for _ in range(MAX_TRIES):
             slant = np.deg2rad(self.max_slant_deg) * rng.random()
             azimuth = rng.uniform(0, 2 * np.pi)
@@ -193,20 +187,20 @@ class FoliageApertureClutter(ApertureBoard):
             if self._holds(p_WH + length * R_WS[:, 2], self.margin_m):
                 return R_WS
         raise ScenarioError(
-            f"a stem of {length:.3f} m at {p_WH.round(3)} does not fit between lower {self.lower}"
-            f" and upper {self.upper}; make the box larger or max_slant_deg larger than 0"
+            f"a stem of {length:.3f} m at {p_WH.round(3)} does not fit into the box {self.lower} to"
+            f" {self.upper}; enlarge it or increase max_slant_deg"
         )
 
     def _leaf(
         self, rng: np.random.Generator, p_WH: Vector, R_WS: Vector, length: float
     ) -> tuple[Vector, Vector, Vector]:
-        """Draws position, orientation and size of a leaf on a stem, within the box."""
+        """Samples p_SL, R_SL and size of a leaf in the box."""
         signs = np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, -1).T
         for _ in range(MAX_TRIES):
             edges = [_draw(rng, ends, 1) for ends in (self.leaf_length_m, self.leaf_width_m)]
             size = np.append(edges, self.leaf_thickness_m)
             along = length * rng.uniform(0.1, 1.0)
-            # Outwards and up the stem, by 10 to 60 degrees from straight across, and twisted.
+            # Outwards and up the stem, 10 to 60 degrees from perpendicular, and twisted.
             R_SL = _rotation(rng.uniform(0.0, 2.0 * np.pi), -np.deg2rad(rng.uniform(10.0, 60.0)))
             twist = np.deg2rad(rng.uniform(-45.0, 45.0))
             c, s = np.cos(twist), np.sin(twist)
@@ -215,12 +209,12 @@ class FoliageApertureClutter(ApertureBoard):
             if self._holds(p_WH + (p_SL + (0.5 * size * signs) @ R_SL.T) @ R_WS.T):
                 return p_SL, R_SL, size
         raise ScenarioError(
-            f"no leaf on the stem at {p_WH.round(3)} fits between lower {self.lower} and upper"
-            f" {self.upper}; make the box larger or leaf_length_m smaller"
+            f"no leaf on the stem at {p_WH.round(3)} fits into the box {self.lower} to"
+            f" {self.upper}; enlarge it or reduce leaf_length_m"
         )
 
     def _holds(self, p_WQ: Vector, margin: float = 0.0) -> bool:
-        """Returns whether points lie in the box, at least `margin` from its sides."""
+        """Returns whether all points lie in the box, at least `margin` from its sides."""
         inset = np.array([margin, margin, 0.0])
         low, high = np.array(self.lower) + inset, np.array(self.upper) - inset
         return bool(np.all(p_WQ >= low) and np.all(p_WQ <= high))

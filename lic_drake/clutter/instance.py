@@ -1,37 +1,99 @@
-"""`ClutterInstance`: one drawn environment as plain arrays."""
+"""`ClutterInstance` and `Stems`: one sampled environment as plain arrays."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lic_drake.clutter.stems import Stems
 from lic_drake.types import BoolVector, IntVector, Vector, check_shapes
 
 SHAPES = ("cylinder", "box", "sphere")
 """Shape names: an upright cylinder (radius, length), a box (full edges), a sphere (radius)."""
+_ARRAYS = ("size", "p_WO", "yaw", "mass", "movable")
+_NAMES = ("shape", "material")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stems:
+    """m straight stems with elastic roots, and k leaves on them, in W, SI units.
+
+    A stem is a rigid cylinder on a spring hinge at its root H; its frame S has its origin there and
+    Sz along the stem.
+
+    Attributes:
+        p_WH: Roots, shape (m, 3), metres.
+        R_WS: Orientations at rest, shape (m, 3, 3).
+        length: Shape (m,), metres.
+        radius: Shape (m,), metres.
+        mass: Of each stem with its leaves, shape (m,), kg.
+        stiffness: Of each hinge about any axis across the stem, shape (m,), Nm/rad; infinite for a
+            fixed branch.
+        damping: Of each hinge, shape (m,), Nms/rad.
+        leaf_stem: Index of each leaf's stem, shape (k,).
+        p_SL: Centres of the leaves in S, shape (k, 3), metres.
+        R_SL: Their orientations, shape (k, 3, 3); Lx along the leaf, Lz across it.
+        leaf_size: Full edges along Lx, Ly and Lz, shape (k, 3), metres.
+    """
+
+    p_WH: Vector
+    R_WS: Vector
+    length: Vector
+    radius: Vector
+    mass: Vector
+    stiffness: Vector
+    damping: Vector
+    leaf_stem: IntVector
+    p_SL: Vector
+    R_SL: Vector
+    leaf_size: Vector
+
+    def __post_init__(self) -> None:
+        m, k = len(self.p_WH), len(self.leaf_stem)
+        check_shapes(self, p_WH=(m, 3), R_WS=(m, 3, 3), length=(m,), radius=(m,), mass=(m,))
+        check_shapes(self, stiffness=(m,), damping=(m,))
+        check_shapes(self, p_SL=(k, 3), R_SL=(k, 3, 3), leaf_size=(k, 3))
+        if k and not (0 <= self.leaf_stem.min() and self.leaf_stem.max() < m):
+            raise ValueError(f"leaf_stem must be from 0 to {m - 1}")
+
+    @property
+    def num_stems(self) -> int:
+        """Number of stems, elastic and fixed."""
+        return len(self.p_WH)
+
+    @property
+    def fixed(self) -> BoolVector:
+        """Which stems are fixed branches, shape (m,)."""
+        return np.isinf(self.stiffness)
+
+    def subset(self, which: BoolVector) -> "Stems":
+        """Returns the stems in a mask of shape (m,), with their leaves."""
+        leaves = which[self.leaf_stem]
+        of_stems = ("p_WH", "R_WS", "length", "radius", "mass", "stiffness", "damping")
+        of_leaves = ("p_SL", "R_SL", "leaf_size")
+        return Stems(
+            **{name: getattr(self, name)[which] for name in of_stems},
+            **{name: getattr(self, name)[leaves] for name in of_leaves},
+            leaf_stem=(np.cumsum(which) - 1)[self.leaf_stem[leaves]],
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
 class ClutterInstance:
-    """The objects of one environment, in the world frame W, SI units.
-
-    `make_objects` makes objects of one kind, `join` puts several kinds together.
+    """The n objects of one environment, in W, SI units; see `make_objects` and `join`.
 
     Attributes:
-        shape: n names out of `SHAPES`.
+        shape: n names in `SHAPES`.
         size: Shape (n, 3), metres: cylinder (radius, length, 0), box (x, y, z edges), sphere
             (radius, 0, 0).
-        p_WO: Positions of the objects' centres, shape (n, 3), metres.
-        yaw: Rotations of the objects about Wz, shape (n,), radians.
-        mass: Shape (n,), kg; not used for fixed objects.
-        movable: Shape (n,), False for objects fixed to the ground.
-        material: What each object is made of, for its looks; may be empty.
-        p_WG: The goal that the environment offers, shape (3,), metres; None where a goal may lie
-            anywhere.
-        p_WA: Centres of the apertures through which a robot may reach, shape (k, 3), metres; None
-            where the front is open.
-        stems: Springy stems with leaves beside the objects; None where nothing grows.
+        p_WO: Centres, shape (n, 3), metres.
+        yaw: Rotations about Wz, shape (n,), radians.
+        mass: Shape (n,), kg; ignored for fixed objects.
+        movable: Shape (n,), False for fixed objects.
+        material: Of each object, for its colour; may be empty.
+        p_WG: The environment's goal, shape (3,), metres; None if goals are sampled elsewhere.
+        p_WA: Centres of the open apertures, shape (k, 3), metres; None without a barrier.
+        stems: Elastic stems with leaves; None if there are none.
     """
 
     shape: tuple[str, ...]
@@ -60,43 +122,30 @@ class ClutterInstance:
 
     @property
     def num_axes(self) -> int:
-        """In how many directions movable objects move: 2 on the ground, 3 where spheres float.
-
-        Stems bend about 2 axes.
-        """
+        """Degrees of freedom of a movable object: 2 on the ground, 3 for floating spheres."""
         return 3 if "sphere" in self.shape else 2
 
     def translated(self, offset: Vector) -> "ClutterInstance":
-        """Returns the same environment moved by an offset, shape (3,), metres."""
+        """Returns the environment translated by an offset, shape (3,), metres."""
+        stems = self.stems and replace(self.stems, p_WH=self.stems.p_WH + offset)
         return replace(
             self,
             p_WO=self.p_WO + offset,
             p_WG=None if self.p_WG is None else self.p_WG + offset,
             p_WA=None if self.p_WA is None else self.p_WA + offset,
-            stems=None if self.stems is None else self.stems.translated(offset),
+            stems=stems,
         )
 
     def subset(self, indices: IntVector) -> "ClutterInstance":
-        """Returns the environment with some of its objects, in this order; repeats are allowed."""
-        return replace(
-            self,
-            shape=tuple(self.shape[i] for i in indices),
-            size=self.size[indices],
-            p_WO=self.p_WO[indices],
-            yaw=self.yaw[indices],
-            mass=self.mass[indices],
-            movable=self.movable[indices],
-            material=tuple(self.material[i] for i in indices),
-        )
+        """Returns the environment with the objects at these indices, which may repeat."""
+        columns: dict[str, Any] = {name: getattr(self, name)[indices] for name in _ARRAYS}
+        columns |= {name: tuple(getattr(self, name)[i] for i in indices) for name in _NAMES}
+        return replace(self, **columns)
 
     def with_objects_at(self, p_WO: Vector) -> "ClutterInstance":
-        """Returns the environment with its movable objects elsewhere.
+        """Returns the environment with its movable objects at p_WO, shape (k, num_axes), metres.
 
-        Stems are as before: they spring back as soon as nothing holds them.
-
-        Args:
-            p_WO: Their positions along the axes in which they move, shape (movable objects,
-                num_axes), metres.
+        Stems are unchanged: they spring back when released.
         """
         if self.stems is not None:
             return self
@@ -115,23 +164,23 @@ def make_objects(
     movable: ArrayLike = False,
     material: str = "",
 ) -> ClutterInstance:
-    """Returns n objects of one shape; a value may be given once for all of them.
+    """Returns n objects of one shape; see `ClutterInstance`.
 
     Args:
         shape: One of `SHAPES`.
-        size: As many numbers as the shape has, for all or for each object, metres.
-        p_WO: Centres, shape (n, 3), or (n, 2) for objects centred at z = 0, metres.
-        yaw: Rotation about Wz, shape (n,) or a number, radians.
+        size: The shape's dimensions, for all or for each object, metres.
+        p_WO: Centres, shape (n, 3), or (n, 2) for z = 0, metres.
+        yaw: Shape (n,) or a number, radians.
         mass: Shape (n,) or a number, kg.
-        movable: Shape (n,) or one truth value.
-        material: What they are made of, for their looks.
+        movable: Shape (n,) or one bool.
+        material: Material of all of them.
     """
     p_WO = np.atleast_2d(np.asarray(p_WO, dtype=float))
     n = len(p_WO)
     return ClutterInstance(
         shape=(shape,) * n,
-        size=_filled(np.atleast_2d(np.asarray(size, dtype=float)), n),
-        p_WO=_filled(p_WO, n),
+        size=_pad(np.atleast_2d(np.asarray(size, dtype=float)), n),
+        p_WO=_pad(p_WO, n),
         yaw=np.full(n, yaw, dtype=float),
         mass=np.full(n, mass, dtype=float),
         movable=np.full(n, movable, dtype=bool),
@@ -146,22 +195,16 @@ def join(
     stems: Stems | None = None,
 ) -> ClutterInstance:
     """Returns an environment with the objects of all parts, in order; see `ClutterInstance`."""
-    return ClutterInstance(
-        shape=tuple(shape for part in parts for shape in part.shape),
-        size=np.vstack([np.empty((0, 3)), *(part.size for part in parts)]),
-        p_WO=np.vstack([np.empty((0, 3)), *(part.p_WO for part in parts)]),
-        yaw=np.concatenate([np.empty(0), *(part.yaw for part in parts)]),
-        mass=np.concatenate([np.empty(0), *(part.mass for part in parts)]),
-        movable=np.concatenate([np.empty(0, dtype=bool), *(part.movable for part in parts)]),
-        material=tuple(material for part in parts for material in part.material),
-        p_WG=p_WG,
-        p_WA=p_WA,
-        stems=stems,
-    )
+    parts = (make_objects("box", [1.0], np.empty((0, 3))), *parts)
+    columns: dict[str, Any] = {
+        name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS
+    }
+    columns |= {name: sum((getattr(part, name) for part in parts), ()) for name in _NAMES}
+    return ClutterInstance(**columns, p_WG=p_WG, p_WA=p_WA, stems=stems)
 
 
-def _filled(rows: Vector, n: int) -> Vector:
-    """Returns n rows of three numbers, those that are missing 0."""
-    filled = np.zeros((n, 3))
-    filled[:, : rows.shape[1]] = rows
-    return filled
+def _pad(rows: Vector, n: int) -> Vector:
+    """Returns n rows padded with zeros to three columns."""
+    padded = np.zeros((n, 3))
+    padded[:, : rows.shape[1]] = rows
+    return padded

@@ -12,7 +12,7 @@ from lic_drake.config import check_numbers
 class PassageClutter:
     """Parameters of the category; the goal of an environment is the centre of its passage.
 
-    Sizes are the paper's. It does not state the distance of the passages, nor their directions:
+    Dimensions are the paper's. It states neither distance nor direction of the passages:
     `models/scenarios/passage-clutter.yaml` says how those were chosen.
     """
 
@@ -22,11 +22,11 @@ class PassageClutter:
     wall_length_m: float = 0.4
     wall_width_m: float = 0.02
     wall_height_m: float = 0.2
-    # Ends of the segment on which the passage's centre lies, (x, y) in W, metres: 0.4 m long,
-    # "horizontal" (paper IV-A), that is along y, as the paper calls +x "vertical" (Fig. 6).
+    # Ends of the segment of passage centres, (x, y) in W, metres: 0.4 m long and "horizontal"
+    # (paper IV-A), that is along y, as the paper calls +x "vertical" (Fig. 6).
     centre_from: list[float] = field(default_factory=lambda: [0.695, -0.2])
     centre_to: list[float] = field(default_factory=lambda: [0.695, 0.2])
-    # Range of the walls' direction, degrees from +x to the left, at most 90 to either side.
+    # Range of the walls' direction, degrees counterclockwise from +x, from -90 to 90.
     min_slope_deg: float = 5.0
     max_slope_deg: float = 35.0
 
@@ -40,7 +40,7 @@ class PassageClutter:
         )
 
     def sample(self, rng: np.random.Generator) -> ClutterInstance:
-        """Draws one environment: centre and slope uniform, the walls parallel to each other."""
+        """Samples an environment with uniform centre and slope."""
         begin, end = np.array(self.centre_from), np.array(self.centre_to)
         centre = begin + rng.uniform() * (end - begin)
         slope = np.deg2rad(rng.uniform(self.min_slope_deg, self.max_slope_deg))

@@ -1,4 +1,4 @@
-"""Uniform placement of discs in a rectangle, or of balls in a box, without overlap."""
+"""Rejection sampling of non-overlapping discs in a rectangle, or balls in a box."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -7,7 +7,7 @@ from lic_drake.errors import ScenarioError
 from lic_drake.types import Vector
 
 MAX_TRIES = 10_000
-"""Draws for a single disc before the rectangle counts as full."""
+"""Attempts per disc before the rectangle counts as full."""
 
 
 def place_discs(
@@ -17,20 +17,17 @@ def place_discs(
     upper: ArrayLike,
     min_distance: float,
 ) -> Vector:
-    """Draws disc centres one after the other, rejecting those too close to earlier ones.
+    """Samples uniform centres, shape (count, d), metres, rejecting those too close to earlier ones.
 
-    The rule of the authors' generator (gt-ros-pkg/hrl-haptic-manip, obstacles.py): uniform centres,
-    accepted when no earlier centre is nearer than `min_distance`; goals are not considered.
+    The rule of the authors' generator (gt-ros-pkg/hrl-haptic-manip, obstacles.py), which ignores
+    goals.
 
     Args:
-        rng: Source of the draws.
-        count: Number of discs, or balls.
-        lower: Lower corner of the rectangle or box for the centres, shape (d,), metres.
+        rng: Random generator.
+        count: Number of centres.
+        lower: Lower corner of their range, shape (d,), metres.
         upper: Upper corner, shape (d,), metres.
         min_distance: Smallest distance between two centres, metres.
-
-    Returns:
-        Centres, shape (count, d), metres.
 
     Raises:
         ScenarioError: The discs do not fit.

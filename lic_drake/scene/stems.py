@@ -28,7 +28,7 @@ from pydrake.multibody.tree import (
     UnitInertia,
 )
 
-from lic_drake.clutter.stems import Stems
+from lic_drake.clutter.instance import Stems
 from lic_drake.scene.looks import BRANCH_COLOR, LEAF_COLORS, STEM_COLOR
 from lic_drake.scene.movables import CARRIAGE_SHARE
 

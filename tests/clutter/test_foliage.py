@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from scipy.spatial.distance import pdist
 
 from lic_drake.clutter.foliage import FoliageApertureClutter
-from lic_drake.clutter.instance import ClutterInstance
-from lic_drake.clutter.stems import Stems
+from lic_drake.clutter.instance import ClutterInstance, Stems
 from lic_drake.errors import ScenarioError
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.seeds import make_generator
@@ -116,22 +115,15 @@ def test_the_instances_apertures_are_those_without_a_cover(
     assert all(0.26 < share < 0.74 for share in between)
 
 
-def test_covers_leave_the_foliage_as_it_is() -> None:
-    a, b = stems_of(sample(SPARSE)), stems_of(sample(replace(SPARSE, num_blocked=15)))
-    np.testing.assert_array_equal(a.p_WH, b.p_WH)
-    np.testing.assert_array_equal(a.p_SL, b.p_SL)
-
-
 @pytest.mark.parametrize(
     ("values", "message"),
     [
         ({"leaves_per_stem": 51}, "leaves_per_stem must be from 0 to 50"),
-        ({"rigidity_N_m2": 0.0}, "rigidity_N_m2 must be a positive number"),
         ({"leaf_length_m": [0.1, 0.05]}, r"leaf_length_m must be \[least, most\]"),
         ({"covered_share": [0.5, 1.1]}, "covered_share must be from 0 to 1"),
         ({"num_blocked": 18}, "num_partly_covered must be from 0 to 1, got 2"),
-        ({"lower": [0.5, -0.6, 0.5]}, "would grow through the board"),
-        ({"margin_m": 0.2}, "leave nothing between"),
+        ({"lower": [0.5, -0.6, 0.5]}, "would overlap the board"),
+        ({"margin_m": 0.2}, "below half of the box's width"),
         ({"stem_length_m": [0.4, 1.0]}, "longer than the box"),
     ],
 )

@@ -3,8 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lic_drake.clutter.instance import join, make_objects
-from lic_drake.clutter.stems import Stems
+from lic_drake.clutter.instance import Stems, join, make_objects
 
 STEMS = Stems(
     p_WH=np.arange(6.0).reshape(2, 3),

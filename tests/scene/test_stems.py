@@ -9,8 +9,7 @@ from pydrake.systems.analysis import ApplySimulatorConfig, SimulatorConfig
 from scipy.optimize import brentq
 from support.worlds import ARM, World, add_sensor, make_clutter, make_world
 
-from lic_drake.clutter.instance import ClutterInstance
-from lic_drake.clutter.stems import Stems
+from lic_drake.clutter.instance import ClutterInstance, Stems
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.robots.pr2 import RIGHT_ARM_AT_REST, pr2_arm
 from lic_drake.scene.collision import CollisionChecker

@@ -8,8 +8,7 @@ import math
 
 import numpy as np
 
-from lic_drake.clutter.instance import ClutterInstance
-from lic_drake.clutter.stems import Stems
+from lic_drake.clutter.instance import ClutterInstance, Stems
 from lic_drake.robots.arm import Arm
 from lic_drake.types import BoolVector, IntVector, Vector
 
