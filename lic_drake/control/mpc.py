@@ -1,20 +1,19 @@
 """The quasi-static one-step model predictive controller of the paper's reference [1].
 
-Model: the arm is in static balance before and after a step, contacts are linear springs along
-their normals. With joint stiffness K, contact stiffness k_c, unit outward normals n_i and contact
-Jacobians J_i, a change dphi of the equilibrium angles moves the joints and forces by
+The arm is in static equilibrium before and after a step, contacts are linear springs along their
+normals. With joint stiffness K, contact stiffness k_c, outward unit normals n_i and contact
+Jacobians J_i, a change dphi of the equilibrium angles changes joint angles, tip and forces by
 
     dtheta = S dphi,  S = (K + sum_i k_c J_i' n_i n_i' J_i)^-1 K
     dx     = J_E S dphi
     df_i   = k_c n_i' J_i S dphi
 
-Source of the problem's terms: gt-ros-pkg/hrl-haptic-manip (facts only). No Drake here.
+The problem's terms follow gt-ros-pkg/hrl-haptic-manip (facts only). No Drake here.
 
-The program of a step has few variables and cost terms that differ by six orders of magnitude, at
-which interior-point solvers with absolute tolerances give up (Drake's Clarabel:
-"InsufficientProgress" in thousands of steps of the 100 Hz preset). The active set of DAQP is exact:
-Arnstrom, Bemporad and Axehill, A Dual Active-Set Solver for Embedded Quadratic Programming Using
-Recursive LDL' Updates, IEEE TAC 2022.
+The cost terms differ by six orders of magnitude, at which interior-point solvers with absolute
+tolerances fail (Drake's Clarabel: "InsufficientProgress" in thousands of steps of the 100 Hz
+preset). The active-set solver DAQP is exact: Arnstrom, Bemporad and Axehill, A Dual Active-Set
+Solver for Embedded Quadratic Programming Using Recursive LDL' Updates, IEEE TAC 2022.
 """
 
 import math
@@ -28,23 +27,23 @@ from lic_drake.control.mpc_config import MpcConfig
 from lic_drake.types import Vector
 
 PRIMAL_TOLERANCE = 1e-10
-"""How far a limit may be missed, in the rows' units over their length."""
+"""Maximum constraint violation, in the rows' units over their length."""
 
 OPTIMAL, INFEASIBLE = 1, -1
 """DAQP's exit flags."""
 
 
 class MpcInput(NamedTuple):
-    """What the controller knows at a step; m joints, n contacts, all vectors in R.
+    """State and contacts at a step; m joints, n contacts, all vectors in R.
 
     Attributes:
         q: Joint angles theta, shape (m,), radians.
         q_d: Equilibrium angles phi, shape (m,), radians.
-        p_EG: From the tip to the goal, shape (3,), metres.
+        p_EG: Vector from tip to goal, shape (3,), metres.
         Jv_E: Translational Jacobian of the tip, shape (3, m).
         normals: Outward unit normals of the loaded taxels, shape (n, 3).
         forces: Their normal forces, shape (n,), N, compression positive.
-        Jv_C: Translational Jacobians at the loaded taxels, shape (n, 3, m).
+        Jv_C: Their translational Jacobians, shape (n, 3, m).
     """
 
     q: Vector
@@ -57,7 +56,7 @@ class MpcInput(NamedTuple):
 
 
 class Prediction(NamedTuple):
-    """Linear maps from dphi to what a step does.
+    """Linear maps from dphi to the effects of a step.
 
     Attributes:
         joint: S, shape (m, m).
@@ -73,14 +72,8 @@ class Prediction(NamedTuple):
 class QuadraticProgram(NamedTuple):
     """Minimise 1/2 x'Px + c'x subject to row_min <= Ax <= row_max and x_min <= x <= x_max.
 
-    Attributes:
-        P: Positive definite, shape (n, n).
-        c: Shape (n,).
-        A: Shape (k, n), k may be 0.
-        row_min: Shape (k,), may hold -inf.
-        row_max: Shape (k,), may hold inf.
-        x_min: Shape (n,), may hold -inf.
-        x_max: Shape (n,), may hold inf.
+    P is positive definite, shape (n, n), and A has shape (k, n), where k may be 0. Limits may be
+    infinite.
     """
 
     P: Vector
@@ -93,14 +86,12 @@ class QuadraticProgram(NamedTuple):
 
 
 def solve(problem: QuadraticProgram) -> Vector | None:
-    """Returns the minimiser, shape (n,), or None when the constraints contradict each other.
-
-    Where they leave no more than a single point, rounding decides between it and None.
+    """Returns the minimiser, shape (n,), or None if the problem is infeasible.
 
     Raises:
-        numpy.linalg.LinAlgError: P is not positive definite, or the solver gave up.
+        numpy.linalg.LinAlgError: P is not positive definite, or the solver failed.
     """
-    # The first limits, for which A has no rows, are those of the variables.
+    # The first n limits, for which A has no rows, are those of the variables.
     x: Vector
     x, _, flag, _ = daqp.solve(
         problem.P,
@@ -131,17 +122,13 @@ class HapticMpc:
         self._reset_windup = np.deg2rad(config.reset_windup_deg)
 
     def step(self, state: MpcInput) -> Vector:
-        """Returns the change of the equilibrium angles, shape (m,), radians.
-
-        Zero when the limits contradict each other: the arm then holds its equilibrium.
-        """
+        """Returns the change of the equilibrium angles, shape (m,), radians; 0 if infeasible."""
         dq_d = solve(self.make_problem(state))
         return np.zeros_like(state.q) if dq_d is None else dq_d
 
     def pull_back(self, q: Vector, q_d: Vector) -> Vector:
-        """Returns equilibrium angles no further than the wind-up reset from the joint angles."""
-        limit = self._reset_windup
-        return np.minimum(np.maximum(q_d, q - limit), q + limit)
+        """Returns equilibrium angles clipped to the wind-up reset distance from joint angles q."""
+        return np.minimum(np.maximum(q_d, q - self._reset_windup), q + self._reset_windup)
 
     def predict(self, state: MpcInput) -> Prediction:
         """Returns the quasi-static model at a state."""
@@ -152,7 +139,7 @@ class HapticMpc:
         return Prediction(joint=S, tip=state.Jv_E @ S, force=contact * rows @ S)
 
     def wanted_tip_motion(self, p_EG: Vector) -> Vector:
-        """Returns the tip motion of this step towards the goal, shape (3,), metres."""
+        """Returns the desired tip motion of a step, shape (3,), metres."""
         distance = math.sqrt(p_EG @ p_EG)
         if distance < self.config.deadzone_m:
             return np.zeros(3)
@@ -173,14 +160,20 @@ class HapticMpc:
             P = P + weight * rows.T @ rows
             c = c + weight * config.force_decrease_N * rows.sum(axis=0)
 
-        # How far each force may rise or fall in a step, and each joint may go.
+        # Limits of the change of each force and each joint angle.
         margin = config.force_threshold_N - state.forces
         rise = np.where(over, config.rise_over_N, np.minimum(margin, config.rise_below_N))
         fall = np.where(over, config.fall_over_N, config.fall_below_N)
         down, up = self._q_min - state.q, self._q_max - state.q
         if config.forgive_joint_limits:
             down, up = np.minimum(down, 0.0), np.maximum(up, 0.0)
-        x_min, x_max = self._equilibrium_bounds(state)
+        # Limits of the change of the equilibrium angles: rate, wind-up and joint limits.
+        wound = state.q - state.q_d
+        x_min = np.maximum(-self._max_change, wound - self._max_windup)
+        x_max = np.minimum(self._max_change, wound + self._max_windup)
+        if config.equilibrium_in_limits:
+            x_min = np.maximum(x_min, np.minimum(self._q_min - state.q_d, 0.0))
+            x_max = np.minimum(x_max, np.maximum(self._q_max - state.q_d, 0.0))
         return QuadraticProgram(
             P=2.0 * P,
             c=2.0 * c,
@@ -190,13 +183,3 @@ class HapticMpc:
             x_min=x_min,
             x_max=x_max,
         )
-
-    def _equilibrium_bounds(self, state: MpcInput) -> tuple[Vector, Vector]:
-        """Returns the bounds of dphi itself: rate, wind-up and joint limits."""
-        wound = state.q - state.q_d
-        low = np.maximum(-self._max_change, wound - self._max_windup)
-        high = np.minimum(self._max_change, wound + self._max_windup)
-        if self.config.equilibrium_in_limits:
-            low = np.maximum(low, np.minimum(self._q_min - state.q_d, 0.0))
-            high = np.minimum(high, np.maximum(self._q_max - state.q_d, 0.0))
-        return low, high

@@ -1,5 +1,6 @@
-"""Parameters of the quasi-static MPC, with the published sets of values."""
+"""Parameters of the quasi-static MPC, with the published presets."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,76 +17,66 @@ class MpcConfig:
 
     # Control rate, Hz.
     rate_hz: float = 25.0
-    # Contact forces up to this one are "don't care", N (paper V-A: 5 N in 2-D, 3 N in 3-D).
+    # Contact forces up to this threshold are acceptable, N (paper V-A: 5 N in 2-D, 3 N in 3-D).
     force_threshold_N: float = 5.0
-    # Taxel forces up to this one are ignored, N.
+    # Taxel forces up to this value are ignored, N.
     force_trim_N: float = 1.0
     # Assumed stiffness of every contact, N/m.
     contact_stiffness_N_per_m: float = 1000.0
-    # Wanted tip motion a step, m; shrinks in proportion once the goal is nearer than
-    # `slow_distance_m` (0: take the remaining error when it is smaller than the step).
+    # Desired tip motion per step, m; proportional to the distance once the goal is nearer than
+    # `slow_distance_m` (0: the remaining error if it is smaller than the step).
     tip_step_m: float = 0.02
     slow_distance_m: float = 0.1
     # Weights: tip position; squared joint torque change ("jerk"); force over the threshold.
     position_weight: float = 1.0
     torque_change_weight: float = 1e-4
     force_weight: float = 0.005
-    # Divide the force term by the number of contacts over the threshold.
+    # Whether the force term is divided by the number of contacts over the threshold.
     force_weight_shared: bool = True
-    # Wanted decrease of a force over the threshold, N a step.
+    # Desired decrease of a force over the threshold, N per step.
     force_decrease_N: float = 0.1
-    # Limits of the predicted force change a step, N, below and over the threshold.
+    # Limits of the predicted force change per step, N, below and over the threshold.
     rise_below_N: float = 0.1
     fall_below_N: float = np.inf
     rise_over_N: float = 0.0
     fall_over_N: float = 10.0
-    # Limits of the equilibrium angles: change a step, distance from the joint angles
-    # ("wind-up"), distance at which they are pulled back, degrees.
+    # Limits of the equilibrium angles, degrees: change per step, distance from the joint angles
+    # ("wind-up"), distance to which they are reset.
     max_change_deg: float = 0.5
     max_windup_deg: float = 30.0
     reset_windup_deg: float = 45.0
-    # Keep the equilibrium angles inside the joint limits, too.
+    # Whether the equilibrium angles, too, must satisfy the joint limits.
     equilibrium_in_limits: bool = True
-    # A joint beyond its limit only must not go further (else: must come back in one step).
+    # Whether a joint beyond its limit may stay there (else it must return in one step).
     forgive_joint_limits: bool = True
-    # The tip is not moved any further where it is nearer to the goal than this, m.
+    # Distance to the goal within which the tip is not moved, m.
     deadzone_m: float = 0.0
 
     def __post_init__(self) -> None:
-        # Limits may be infinite, and a negative rise is a wanted fall.
-        limits = ("fall_below_N", "fall_over_N", "max_change_deg", "max_windup_deg")
-        ranges = {
-            "rate_hz": (1.0, 1000.0),
-            **dict.fromkeys((*limits, "reset_windup_deg"), (0.0, np.inf)),
-            **dict.fromkeys(("rise_below_N", "rise_over_N"), (-np.inf, np.inf)),
-        }
+        # Limits may be infinite, and a negative rise is a required decrease.
+        limits = "fall_below_N fall_over_N max_change_deg max_windup_deg reset_windup_deg"
         check_numbers(
             self,
-            # Without a weight on torque changes the program would have no unique solution.
-            positive=(
-                *("force_threshold_N", "contact_stiffness_N_per_m", "tip_step_m"),
-                "torque_change_weight",
-            ),
-            non_negative=(
-                *("force_trim_N", "slow_distance_m", "position_weight", "force_weight"),
-                *("force_decrease_N", "deadzone_m"),
-            ),
-            ranges=ranges,
+            # The weight on torque changes makes the solution unique.
+            positive="force_threshold_N contact_stiffness_N_per_m tip_step_m"
+            " torque_change_weight".split(),
+            non_negative="force_trim_N slow_distance_m position_weight force_weight"
+            " force_decrease_N deadzone_m".split(),
+            ranges={
+                "rate_hz": (1.0, 1000.0),
+                **dict.fromkeys(limits.split(), (0.0, np.inf)),
+                **dict.fromkeys(("rise_below_N", "rise_over_N"), (-np.inf, np.inf)),
+            },
         )
 
     @property
     def period_s(self) -> float:
-        """Time between two control steps, seconds."""
+        """Control period, seconds."""
         return 1.0 / self.rate_hz
 
 
-def haptic_mpc_2013() -> MpcConfig:
-    """Returns the later controller: 25 Hz, up to 0.5 m/s (hrl_haptic_mpc, simulated 3 links)."""
-    return MpcConfig()
-
-
 def ijrr_2013() -> MpcConfig:
-    """Returns the controller of the paper's reference [1]: 100 Hz, 0.05 m/s."""
+    """Returns the parameters of the paper's reference [1]: 100 Hz, 0.05 m/s."""
     return MpcConfig(
         rate_hz=100.0,
         force_trim_N=0.5,
@@ -95,10 +86,8 @@ def ijrr_2013() -> MpcConfig:
         force_weight=1.0,
         force_weight_shared=False,
         force_decrease_N=0.2,
-        rise_below_N=0.1,
         fall_below_N=0.1,
         rise_over_N=-0.01,
-        fall_over_N=10.0,
         max_change_deg=np.inf,
         max_windup_deg=np.inf,
         reset_windup_deg=np.inf,
@@ -108,7 +97,7 @@ def ijrr_2013() -> MpcConfig:
 
 
 def haptic_mpc_pr2() -> MpcConfig:
-    """Returns the later controller with its values for the PR2 (hrl_haptic_mpc; 3 N, paper V-A)."""
+    """Returns haptic_mpc_2013 with its values for the PR2 (hrl_haptic_mpc; 3 N, paper V-A)."""
     return MpcConfig(
         force_threshold_N=3.0,
         contact_stiffness_N_per_m=200.0,
@@ -119,9 +108,12 @@ def haptic_mpc_pr2() -> MpcConfig:
     )
 
 
-PRESETS = {
-    "haptic_mpc_2013": haptic_mpc_2013,
+PRESETS: dict[str, Callable[[], MpcConfig]] = {
+    "haptic_mpc_2013": MpcConfig,
     "ijrr_2013": ijrr_2013,
     "pr2": haptic_mpc_pr2,
 }
-"""The published parameter sets by name."""
+"""The published parameter sets by name.
+
+haptic_mpc_2013 is the later controller, 25 Hz, up to 0.5 m/s (hrl_haptic_mpc, simulated 3 links).
+"""

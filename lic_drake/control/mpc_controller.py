@@ -11,7 +11,7 @@ from lic_drake.types import Vector
 
 
 class HapticMpcController(LeafSystem):
-    """Moves the arm's equilibrium angles so that the tip nears the goal with low forces.
+    """Moves the arm's equilibrium angles so that the tip approaches the goal with low forces.
 
     Input ports:
         arm_state: [q, v] of the arm, size 2 m, rad and rad/s.

@@ -15,20 +15,20 @@ from lic_drake.robots.arm import Arm
 from lic_drake.types import Vector
 
 BODY = -1
-"""Stands for a link where the geometry is the robot's, but has no skin."""
+"""Link index of the robot's geometry without skin."""
 
 MAX_ANGLE_COS = np.cos(np.deg2rad(45.0))
-"""A taxel takes a force only from within 45 degrees of its normal (authors' simulator)."""
+"""A taxel only senses forces within 45 degrees of its normal (authors' simulator)."""
 
 
 class ContactPatch(NamedTuple):
-    """One contact of a link with one object.
+    """A contact of a link with an object; k faces, one for a point contact.
 
     Attributes:
         link: Index of the link.
-        p_RQ: Centres of the patch's faces (one for a point contact), shape (k, 3), metres.
+        p_RQ: Centres of the faces, shape (k, 3), metres.
         n_R: Unit normals of the faces, out of the link, shape (k, 3).
-        force: Normal forces of the link on the object at the faces, shape (k,), N.
+        force: Normal forces of the link on the object, shape (k,), N.
     """
 
     link: int
@@ -38,10 +38,10 @@ class ContactPatch(NamedTuple):
 
 
 class TactileSensor(LeafSystem):
-    """Reads contact results and reports the force normal to the surface on each taxel.
+    """Computes the normal force on each taxel from contact results.
 
-    Hydroelastic patches are read face by face (pressure times area); point contacts, to which
-    Drake falls back silently where two rigid bodies meet, count as patches of one face.
+    Hydroelastic patches are read face by face (pressure times area); point contacts, Drake's silent
+    fallback for two rigid bodies, count as patches of one face.
 
     Input ports:
         contact_results: Contact results of the plant (abstract).
@@ -53,8 +53,8 @@ class TactileSensor(LeafSystem):
         arm: The arm.
         layout: Its taxels.
         skin_links: Skin geometry -> index into the arm's link names.
-        body: Geometry of the rest of the robot. Where the arm touches that, or itself, it feels
-            nothing: the controller would take it for an obstacle.
+        body: Geometry of the rest of the robot. Contact with it, or of the arm with itself, is not
+            sensed: the controller would treat it as an obstacle.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class TactileSensor(LeafSystem):
         self._arm = arm
         self._num_joints = arm.num_joints
         self._layout = layout
-        # Numbers: a GeometryId that a plant has returned keeps the whole diagram alive for ever.
+        # Integers: a GeometryId returned by a plant keeps the whole diagram alive.
         self._skin_links = {geometry.get_value(): link for geometry, link in skin_links.items()}
         self._skin_links |= {geometry.get_value(): BODY for geometry in body}
         self._contact_results = self.DeclareAbstractInputPort(
@@ -79,7 +79,7 @@ class TactileSensor(LeafSystem):
             "taxel_force",
             layout.num_taxels,
             self._calc_taxel_force,
-            # Without time among them, so that all readers of an instant share one calculation.
+            # Time is left out, so that all readers at an instant share one calculation.
             prerequisites_of_calc={
                 self.input_port_ticket(self._contact_results.get_index()),
                 self.input_port_ticket(self._arm_state.get_index()),
@@ -87,7 +87,7 @@ class TactileSensor(LeafSystem):
         )
 
     def _calc_taxel_force(self, context: Context, output: BasicVector) -> None:
-        results = self._eval_contacts(context)
+        results = cast(ContactResults, self._contact_results.Eval(context))
         patches = read_patches(results, lambda geometry: self._skin_links.get(geometry.get_value()))
         if not patches:
             output.SetFromVector(np.zeros(self._layout.num_taxels))
@@ -95,10 +95,6 @@ class TactileSensor(LeafSystem):
         q = np.asarray(self._arm_state.Eval(context))[: self._num_joints]
         pose = self._arm.calc_pose(q)
         output.SetFromVector(calc_taxel_forces(self._layout, pose.R_RL, pose.p_RL, patches))
-
-    def _eval_contacts(self, context: Context) -> ContactResults:
-        """Lets the plant find and solve the contacts of this instant."""
-        return cast(ContactResults, self._contact_results.Eval(context))
 
 
 def read_patches(
@@ -108,17 +104,13 @@ def read_patches(
 
     Args:
         results: Contact results of the plant.
-        link_of: Gives the link index of a skin geometry, `BODY` for the rest of the robot, None
+        link_of: Returns the link index of a skin geometry, `BODY` for the rest of the robot, None
             for any other geometry.
     """
-    patches = [
-        _read_surface(results.hydroelastic_contact_info(i), link_of)
-        for i in range(results.num_hydroelastic_contacts())
-    ]
-    patches += [
-        _read_point(results.point_pair_contact_info(i), link_of)
-        for i in range(results.num_point_pair_contacts())
-    ]
+    surfaces = map(results.hydroelastic_contact_info, range(results.num_hydroelastic_contacts()))
+    points = map(results.point_pair_contact_info, range(results.num_point_pair_contacts()))
+    patches = [_read_surface(info, link_of) for info in surfaces]
+    patches += [_read_point(info, link_of) for info in points]
     return [patch for patch in patches if patch is not None]
 
 
@@ -135,9 +127,7 @@ def _read_surface(
     p_WQ = [surface.centroid(i) for i in faces]
     normal = [surface.face_normal(i) for i in faces]
     force = [pressure.EvaluateCartesian(i, p_WQ[i]) * surface.area(i) for i in faces]
-    return ContactPatch(
-        link=link, p_RQ=np.array(p_WQ), n_R=sign * np.array(normal), force=np.array(force)
-    )
+    return ContactPatch(link, np.array(p_WQ), sign * np.array(normal), np.array(force))
 
 
 def _read_point(
@@ -150,18 +140,14 @@ def _read_point(
         return None
     n_R = -sign * np.asarray(pair.nhat_BA_W)
     force = max(0.0, float(sign * n_R @ info.contact_force()))
-    return ContactPatch(
-        link=link,
-        p_RQ=np.asarray(info.contact_point())[None],
-        n_R=n_R[None],
-        force=np.array([force]),
-    )
+    p_RQ = np.asarray(info.contact_point())
+    return ContactPatch(link, p_RQ[None], n_R[None], np.array([force]))
 
 
 def _felt(first: int | None, second: int | None) -> tuple[int, float]:
-    """Returns the link that feels a contact, and 1 or -1 for the first or second geometry.
+    """Returns the link in contact, and 1 or -1 if it is the first or second geometry.
 
-    The link is `BODY` where no skin touches something that is not part of the robot.
+    The link is `BODY` unless exactly one of the geometries belongs to the robot.
     """
     if first is None and second is not None:
         return second, -1.0
@@ -171,20 +157,17 @@ def _felt(first: int | None, second: int | None) -> tuple[int, float]:
 
 
 def calc_taxel_forces(
-    layout: TaxelLayout,
-    R_RL: Vector,
-    p_RL: Vector,
-    patches: list[ContactPatch],
+    layout: TaxelLayout, R_RL: Vector, p_RL: Vector, patches: list[ContactPatch]
 ) -> Vector:
     """Returns the normal force on each taxel, shape (num_taxels,), N, compression positive.
 
-    A patch on one or two neighbouring taxels loads the single taxel at its centre of pressure, as
-    one contact does in the authors' simulator, with the patch's resultant; a wider one loads the
-    taxels under its faces. No force is lost.
+    The resultant of a patch over one or two neighbouring taxels acts on the taxel at its centre of
+    pressure, as a contact does in the authors' simulator; a wider patch loads the taxels under its
+    faces. No force is lost.
 
     Args:
         layout: The taxels.
-        R_RL: Rotations of the links, shape (k, 3, 3).
+        R_RL: Rotations of the k links, shape (k, 3, 3).
         p_RL: Positions of the links, shape (k, 3), metres.
         patches: The contacts.
     """
@@ -199,8 +182,7 @@ def calc_taxel_forces(
         p_LT = mine.p_LT[under]
         span = p_LT.max(axis=0) - p_LT.min(axis=0)
         if span @ span <= (1.5 * layout.pitch_m) ** 2:
-            # Not the sum of the faces' forces: the facets of a coarse contact mesh and the sides
-            # of a corner splay them.
+            # Not the sum of the magnitudes: facets of a coarse mesh and corners spread directions.
             f_L = force @ n_R @ R
             size = math.sqrt(f_L @ f_L)
             taxel = _nearest_facing(mine, force @ p_LQ / total, f_L)
@@ -211,8 +193,8 @@ def calc_taxel_forces(
 
 
 def _nearest_facing(mine: LinkTaxels, p_LC: Vector, f_L: Vector) -> np.intp:
-    """Returns the taxel nearest to the contact point C among those that face its force."""
+    """Returns the taxel nearest to the contact point C among those facing the force."""
     facing = mine.n_L @ f_L >= MAX_ANGLE_COS * math.sqrt(f_L @ f_L)
     distance = mine.compare_distances(p_LC)
-    # Where none faces it the nearest one takes it: no force is lost.
+    # If none faces it, the nearest of all.
     return np.argmin(np.where(facing, distance, np.inf) if facing.any() else distance)

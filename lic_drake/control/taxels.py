@@ -1,4 +1,4 @@
-"""Where the taxels are on the arm's surface, in the plane and in space."""
+"""Placement of taxels on the arm's surface, in the plane and in space."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,19 +11,19 @@ from lic_drake.robots.skin import SkinShape
 from lic_drake.types import BoolVector, IntVector, Vector
 
 CAP_ANGLES_DEG = (-72.0, -36.0, 0.0, 36.0, 72.0)
-"""Directions of the taxels on an end cap, from the capsule's axis (authors' simulator)."""
+"""Angles of the taxels on an end cap from the capsule's axis (authors' simulator)."""
 INSIDE_M = 1e-6
-"""A taxel this deep inside another shape of its link is covered by it."""
+"""Minimum depth inside another shape of the link at which a taxel is removed."""
 
 
 class LinkTaxels(NamedTuple):
     """The taxels of one link, in its frame.
 
     Attributes:
-        taxels: Their indices among those of the whole arm, shape (n,).
+        taxels: Their indices in the layout, shape (n,).
         p_LT: Positions, shape (n, 3), metres.
         n_L: Outward unit normals, shape (n, 3).
-        half_square: Half of each position's squared length, shape (n,), square metres.
+        half_square: |p_LT|^2 / 2, shape (n,), square metres.
     """
 
     taxels: IntVector
@@ -32,23 +32,20 @@ class LinkTaxels(NamedTuple):
     half_square: Vector
 
     def compare_distances(self, p_LQ: Vector) -> Vector:
-        """Returns what grows with the distance from Q to each taxel, shape (.., n).
+        """Returns |p_QT|^2 / 2 - |p_LQ|^2 / 2 for points p_LQ, shape (.., 3): shape (.., n).
 
-        That is 1/2 |p_QT|^2 without the 1/2 |p_LQ|^2 that all taxels have in common.
-
-        Args:
-            p_LQ: One point or many, shape (.., 3), metres.
+        It orders taxels by distance from Q, as the subtracted term is common to all.
         """
         return self.half_square - p_LQ @ self.p_LT.T
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class TaxelLayout:
     """Taxels of an arm.
 
     Attributes:
-        pitch_m: Distance between two taxels of a row, metres.
-        link: Index of the link that carries each taxel, shape (n,).
+        pitch_m: Distance between neighbours in a row, metres.
+        link: Index of each taxel's link, shape (n,).
         p_LT: Positions in the link frames, shape (n, 3), metres.
         n_L: Outward unit normals in the link frames, shape (n, 3).
     """
@@ -65,7 +62,7 @@ class TaxelLayout:
 
     @cached_property
     def of_link(self) -> tuple[LinkTaxels, ...]:
-        """The taxels link by link, as the sensor needs them at every control step."""
+        """The taxels of each link."""
         links = []
         for link in range(self.link.max() + 1):
             taxels = np.flatnonzero(self.link == link)
@@ -76,7 +73,7 @@ class TaxelLayout:
 
 
 def make_taxels(arm: Arm, per_metre: float) -> TaxelLayout:
-    """Returns the taxels of an arm: rows around capsules in the plane, else all over its faces.
+    """Returns the taxels of an arm: rows around capsules in the plane, else on all its faces.
 
     Args:
         arm: The arm.
@@ -88,16 +85,13 @@ def make_taxels(arm: Arm, per_metre: float) -> TaxelLayout:
 
 
 def planar_taxels(skin: tuple[SkinShape, ...], per_metre: float = 100.0) -> TaxelLayout:
-    """Returns taxels around each capsule in the plane of motion (z = 0).
+    """Returns taxels around each link's capsule in the plane of motion, z = 0.
 
-    Rows on both long sides, symmetric about the link's centre, and five taxels on each end cap,
-    as in the authors' simulator; 100 a metre is the paper's density (V-A).
-
-    Args:
-        skin: One capsule a link, axes in the plane.
-        per_metre: Density of the rows, 1/m.
+    Rows on both long sides, symmetric about the link's centre, and five taxels on each end cap, as
+    in the authors' simulator.
     """
     links, positions, normals = [], [], []
+    cap = np.deg2rad(CAP_ANGLES_DEG)
     for index, capsule in enumerate(skin):
         radius, length = capsule.size
         along = capsule.R_LS[:, 2]
@@ -105,7 +99,6 @@ def planar_taxels(skin: tuple[SkinShape, ...], per_metre: float = 100.0) -> Taxe
         count = int(np.floor(length * per_metre + 1e-9))
         offsets = (np.arange(count) - 0.5 * (count - 1)) / per_metre
         rows = [(offset * along, sign * side) for sign in (1.0, -1.0) for offset in offsets]
-        cap = np.deg2rad(CAP_ANGLES_DEG)
         for end in (1.0, -1.0):
             centre = end * 0.5 * length * along
             rows += [(centre, np.cos(a) * end * along + np.sin(a) * side) for a in cap]
@@ -113,25 +106,20 @@ def planar_taxels(skin: tuple[SkinShape, ...], per_metre: float = 100.0) -> Taxe
             links.append(index)
             positions.append(capsule.p_LS + centre + radius * normal)
             normals.append(normal)
-    return TaxelLayout(
-        pitch_m=1.0 / per_metre,
-        link=np.array(links),
-        p_LT=np.array(positions),
-        n_L=np.array(normals),
-    )
+    return TaxelLayout(1.0 / per_metre, np.array(links), np.array(positions), np.array(normals))
 
 
 def surface_taxels(
     surface: tuple[SkinShape, ...], link_names: tuple[str, ...], per_metre: float
 ) -> TaxelLayout:
-    """Returns a lattice of taxels on every face, but for points inside another shape of the link.
+    """Returns a lattice of taxels on every face, except inside another shape of the link.
 
-    A face gets as many rows as fit at the density, and at least one, with equal distances between
-    them and half of that to its edges, so that every taxel stands for an area of the same size.
+    Rows are equally spaced, with half of that distance to the face's edges, so that all taxels
+    represent equal areas.
 
     Args:
         surface: The shapes.
-        link_names: Names of the links; a taxel's link is the index of its shape's in these.
+        link_names: Names of the links, by index.
         per_metre: Density of the rows, 1/m.
     """
     links, positions, normals = [], [], []
@@ -146,15 +134,12 @@ def surface_taxels(
         positions.append(p_LT[free])
         normals.append((n_S @ shape.R_LS.T)[free])
     return TaxelLayout(
-        pitch_m=1.0 / per_metre,
-        link=np.concatenate(links),
-        p_LT=np.vstack(positions),
-        n_L=np.vstack(normals),
+        1.0 / per_metre, np.concatenate(links), np.vstack(positions), np.vstack(normals)
     )
 
 
 def is_inside(shape: SkinShape, p_LQ: Vector) -> BoolVector:
-    """Returns which points, shape (n, 3), in the frame of its link, lie within a shape."""
+    """Returns which points of the link's frame, shape (n, 3), lie inside a shape."""
     p_SQ = np.abs((p_LQ - shape.p_LS) @ shape.R_LS)
     if shape.kind == "box":
         return np.all(p_SQ < 0.5 * np.array(shape.size) - INSIDE_M, axis=1)
@@ -188,7 +173,7 @@ def _cylinder(shape: SkinShape, per_metre: float) -> tuple[Vector, Vector]:
     around = _ring(radius, per_metre)
     barrel = np.array([(c, s, z) for z in _rows(length, per_metre) for c, s in around])
     positions, normals = [barrel * [radius, radius, 1.0]], [barrel * [1.0, 1.0, 0.0]]
-    # Rings at the middles of equally wide strips of the end faces.
+    # Rings in the middle of equally wide strips of the end faces.
     strips = max(1, round(radius * per_metre))
     radii = radius * (np.arange(strips) + 0.5) / strips
     disc = np.vstack([r * _ring(r, per_metre) for r in radii])
@@ -200,11 +185,11 @@ def _cylinder(shape: SkinShape, per_metre: float) -> tuple[Vector, Vector]:
 
 
 def _capsule(shape: SkinShape, per_metre: float) -> tuple[Vector, Vector]:
-    """Returns positions and normals on barrel and half spheres, in the shape's frame."""
+    """Returns positions and normals on barrel and hemispheres, in the shape's frame."""
     radius, length = shape.size
     n_S = [(c, s, 0.0) for _ in _rows(length, per_metre) for c, s in _ring(radius, per_metre)]
     z = [z for z in _rows(length, per_metre) for _ in _ring(radius, per_metre)]
-    # Rings at the middles of equally wide strips of the half spheres.
+    # Rings in the middle of equally wide strips of the hemispheres.
     strips = max(1, round(0.5 * np.pi * radius * per_metre))
     for elevation in 0.5 * np.pi * (np.arange(strips) + 0.5) / strips:
         up, across = np.sin(elevation), np.cos(elevation)
@@ -217,7 +202,7 @@ def _capsule(shape: SkinShape, per_metre: float) -> tuple[Vector, Vector]:
 
 
 def _rows(length: float, per_metre: float) -> Vector:
-    """Returns the places of rows over a length about 0, shape (n,), metres."""
+    """Returns the positions of rows over a length centred at 0, shape (n,), metres."""
     count = max(1, round(length * per_metre))
     return np.asarray((np.arange(count) + 0.5) * (length / count) - 0.5 * length)
 

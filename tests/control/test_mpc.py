@@ -7,13 +7,12 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import fsolve
-from support.optimality import kkt_residual, largest_margin, violation
 from support.worlds import ARM, LAYOUT
 
 from lic_drake.control.mpc import HapticMpc, MpcInput, solve
-from lic_drake.control.mpc_config import MpcConfig, haptic_mpc_2013, ijrr_2013
+from lic_drake.control.mpc_config import MpcConfig, ijrr_2013
 
-PRESETS = [haptic_mpc_2013, ijrr_2013]
+PRESETS = [MpcConfig, ijrr_2013]
 K = np.array([30.0, 20.0, 15.0])
 
 
@@ -104,8 +103,8 @@ def test_the_model_is_the_derivative_of_the_static_balance(
 @pytest.mark.parametrize(
     ("preset", "distance", "expected"),
     [
-        (haptic_mpc_2013, 0.5, 0.02),
-        (haptic_mpc_2013, 0.05, 0.01),
+        (MpcConfig, 0.5, 0.02),
+        (MpcConfig, 0.05, 0.01),
         (ijrr_2013, 0.5, 0.0005),
         (ijrr_2013, 0.0002, 0.0002),
     ],
@@ -170,7 +169,7 @@ def test_a_step_keeps_every_limit_of_the_published_problem(
     below = ~over
     assert np.all(change[below] <= np.minimum(5.0 - state.forces[below], 0.1) + tolerance)
     joints = state.q + model.joint @ x
-    if preset is haptic_mpc_2013:
+    if preset is MpcConfig:
         assert np.all(change[over] <= tolerance)
         assert np.all(np.abs(x) <= np.deg2rad(0.5) + tolerance)
         assert np.all(np.abs(state.q_d + x - state.q) <= np.deg2rad(30.0) + tolerance)
@@ -184,21 +183,6 @@ def test_a_step_keeps_every_limit_of_the_published_problem(
     assert np.all(change[over] >= -10.0 - tolerance)
     assert np.all(joints >= ARM.q_min - tolerance)
     assert np.all(joints <= ARM.q_max + tolerance)
-
-
-@pytest.mark.parametrize("preset", PRESETS)
-@given(state=states())
-def test_a_step_is_the_optimum_and_there_is_one_if_there_can_be(
-    preset: type[MpcConfig], state: MpcInput
-) -> None:
-    # With G1 the force terms weigh up to a million times as much as the others.
-    problem = make_mpc(preset()).make_problem(state)
-    solution = solve(problem)
-    if solution is None:
-        assert largest_margin(problem) < 1e-7
-    else:
-        assert violation(problem, solution) < 1e-7
-        assert kkt_residual(problem, solution) < 1e-5
 
 
 @settings(max_examples=100)
@@ -240,8 +224,8 @@ def test_forces_that_cannot_all_fall_make_the_arm_hold_its_equilibrium() -> None
     np.testing.assert_allclose(state.normals[0], -state.normals[1], atol=1e-12)
     np.testing.assert_array_equal(make_mpc(ijrr_2013()).step(state), np.zeros(3))
     # The later controller only forbids them to rise, so it may still move along the contact.
-    x = make_mpc(haptic_mpc_2013()).step(state)
-    np.testing.assert_allclose(make_mpc(haptic_mpc_2013()).predict(state).force @ x, 0.0, atol=1e-8)
+    x = make_mpc(MpcConfig()).step(state)
+    np.testing.assert_allclose(make_mpc(MpcConfig()).predict(state).force @ x, 0.0, atol=1e-8)
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
@@ -253,7 +237,7 @@ def test_a_joint_beyond_its_limit_goes_no_further_or_comes_back_at_once(side: fl
     for sign in (-1.0, 1.0):
         goal = tuple(0.3 * sign * ARM.calc_pose(q).Jv_E[:, 2])
         state = taxel_state(q, [], [], q_d, goal)
-        x = make_mpc(haptic_mpc_2013()).step(state)
+        x = make_mpc(MpcConfig()).step(state)
         assert side * x[2] <= 1e-9
         assert np.linalg.norm(x) > 1e-3
         first = make_mpc(ijrr_2013())
@@ -264,7 +248,7 @@ def test_a_joint_beyond_its_limit_goes_no_further_or_comes_back_at_once(side: fl
 @pytest.mark.parametrize("joint", [0, 1, 2])
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_the_equilibrium_stays_inside_wind_up_and_joint_limits(joint: int, side: float) -> None:
-    mpc = make_mpc(haptic_mpc_2013())
+    mpc = make_mpc(MpcConfig())
 
     def step(q: np.ndarray, q_d: np.ndarray) -> float:
         pull = tuple(0.5 * side * ARM.calc_pose(q).Jv_E[:, joint])
@@ -281,11 +265,3 @@ def test_the_equilibrium_stays_inside_wind_up_and_joint_limits(joint: int, side:
     # Beyond the limit it need not jump back, but goes no further.
     q_d[joint] = limit + np.deg2rad(5.0) * side
     assert step(q, q_d) == pytest.approx(0.0, abs=1e-9)
-
-
-def test_pulling_back_clips_the_wind_up_at_45_degrees() -> None:
-    q = np.deg2rad([-30.0, 60.0, 50.0])
-    q_d = q + np.deg2rad([60.0, -60.0, 20.0])
-    expected = q + np.deg2rad([45.0, -45.0, 20.0])
-    np.testing.assert_allclose(make_mpc(haptic_mpc_2013()).pull_back(q, q_d), expected, atol=1e-12)
-    np.testing.assert_array_equal(make_mpc(ijrr_2013()).pull_back(q, q + 3.0), q + 3.0)

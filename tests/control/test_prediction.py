@@ -5,7 +5,7 @@ import pytest
 from support.worlds import ARM, LAYOUT, World, add_sensor, cylinder, make_clutter, make_world
 
 from lic_drake.control.mpc import HapticMpc, MpcInput
-from lic_drake.control.mpc_config import haptic_mpc_2013
+from lic_drake.control.mpc_config import MpcConfig
 from lic_drake.scene.contact import ContactConfig
 from lic_drake.scene.scene import SceneConfig
 
@@ -70,7 +70,7 @@ def test_a_step_moves_hand_and_force_as_predicted_once_the_arm_has_settled(
     world.advance(6.0)
     k = (world.taxel_force.sum() - before.forces[0]) / (row @ (world.q - before.q))
     assert stiffness[0] < k < stiffness[1]
-    config = haptic_mpc_2013()
+    config = MpcConfig()
     config.contact_stiffness_N_per_m = float(k)
     mpc = HapticMpc(config, ARM.stiffness, ARM.q_min, ARM.q_max)
 

@@ -38,11 +38,6 @@ def press(link: int, p_L: np.ndarray, f_L: np.ndarray) -> np.ndarray:
     return calc_taxel_forces(LAYOUT, *POSES, [patch])
 
 
-def test_a_contact_at_a_taxel_along_its_normal_lights_up_that_taxel_alone() -> None:
-    forces = [press(LAYOUT.link[i], LAYOUT.p_LT[[i]], 3.0 * LAYOUT.n_L[[i]]) for i in range(188)]
-    np.testing.assert_allclose(forces, 3.0 * np.eye(188), atol=1e-12)
-
-
 POINT = st.tuples(st.floats(-0.02, 0.02), st.floats(-0.35, 0.02), st.floats(-0.02, 0.02))
 
 
@@ -110,33 +105,6 @@ def test_a_wide_patch_spreads_over_the_taxels_under_it() -> None:
     np.testing.assert_allclose(inner, 1.0, rtol=0.06)
     centre = forces @ LAYOUT.p_LT / forces.sum()
     assert centre[1] == pytest.approx(-0.15, abs=0.003)
-
-
-def test_an_edge_that_presses_with_both_its_sides_reads_as_one_contact() -> None:
-    # The corner of a box on the side of a link: its two faces push at 40 and -50 degrees.
-    directions = np.deg2rad([40.0, -50.0])
-    f_L = 2.0 * np.column_stack([np.cos(directions), np.sin(directions), np.zeros(2)])
-    forces = press(2, np.array([[0.015, -0.101, 0.0], [0.015, -0.102, 0.0]]), f_L)
-    (loaded,) = np.flatnonzero(forces)
-    assert forces[loaded] == pytest.approx(2.0 * np.sqrt(2.0))
-    assert LAYOUT.n_L[loaded, 0] == 1.0
-    assert LAYOUT.p_LT[loaded, 1] == pytest.approx(-0.1015, abs=0.0051)
-
-
-@given(st.lists(st.tuples(LINK, st.floats(-0.15, -0.05), st.floats(0.1, 10.0)), max_size=6))
-def test_contacts_add_up_taxel_by_taxel(contacts: list[tuple[int, float, float]]) -> None:
-    patches = [
-        make_patch(
-            link,
-            place(link, np.array([[0.015, along, 0.0]])),
-            turn(link, np.array([[force, 0.0, 0.0]])),
-        )
-        for link, along, force in contacts
-    ]
-    together = calc_taxel_forces(LAYOUT, *POSES, patches)
-    apart = [calc_taxel_forces(LAYOUT, *POSES, [patch]) for patch in patches]
-    np.testing.assert_allclose(together, np.sum([np.zeros(188), *apart], axis=0), atol=1e-12)
-    assert together.sum() == pytest.approx(sum(force for _, _, force in contacts))
 
 
 @pytest.mark.filterwarnings("error")

@@ -36,15 +36,6 @@ def capsule(radius: float, length: float, angle: float, p_LC: tuple[float, float
     )
 
 
-@pytest.mark.parametrize(("link", "on_sides"), [(0, 38), (1, 66), (2, 54)])
-def test_each_link_has_the_authors_number_of_taxels(link: int, on_sides: int) -> None:
-    mine = LAYOUT.link == link
-    # A side's normal is at a right angle to the link's axis, which is Ly.
-    sides = mine & (np.abs(LAYOUT.n_L[:, 1]) < 1e-12)
-    assert np.count_nonzero(sides) == on_sides
-    assert np.count_nonzero(mine & ~sides) == 10
-
-
 def test_the_arm_has_188_taxels_1_cm_apart() -> None:
     assert LAYOUT.num_taxels == 188 == len(LAYOUT.p_LT) == len(LAYOUT.n_L)
     assert LAYOUT.pitch_m == 0.01
@@ -53,14 +44,6 @@ def test_the_arm_has_188_taxels_1_cm_apart() -> None:
             row = (LAYOUT.link == link) & (np.abs(LAYOUT.n_L[:, 0] - side) < 1e-12)
             y = np.sort(LAYOUT.p_LT[row, 1])
             np.testing.assert_allclose(np.diff(y), 0.01, atol=1e-12)
-
-
-def test_rows_are_symmetric_about_the_middle_of_a_link_and_alike_on_both_sides() -> None:
-    for link, middle in ((0, -0.098), (1, -0.167), (2, -0.1365)):
-        p = LAYOUT.p_LT[LAYOUT.link == link]
-        for mirror in (p * [-1.0, 1.0, 1.0], [0.0, 2.0 * middle, 0.0] + p * [1.0, -1.0, 1.0]):
-            distance = np.linalg.norm(p[:, None] - mirror[None], axis=2)
-            assert np.max(np.min(distance, axis=0)) < 1e-12
 
 
 def test_the_caps_have_taxels_at_0_36_and_72_degrees_from_the_axis() -> None:
@@ -169,18 +152,6 @@ def test_the_density_is_as_asked_for(
     np.testing.assert_allclose(layout.n_L.mean(axis=0), 0.0, atol=1e-12)
     np.testing.assert_allclose(layout.p_LT.mean(axis=0), 1.0, atol=1e-12)
     np.testing.assert_allclose(np.linalg.norm(layout.n_L, axis=1), 1.0)
-
-
-def test_a_box_has_rows_at_equal_distances_and_half_of_that_to_the_edges() -> None:
-    layout = surface_taxels((alone("box", (0.03, 0.05, 0.02)),), ("a",), 100.0)
-    assert layout.num_taxels == 2 * (3 * 5 + 5 * 2 + 3 * 2)
-    # Sx, Sy and Sz lie along Ly, Lz and Lx.
-    top = layout.p_LT[layout.n_L[:, 0] > 0.5] - 1.0
-    np.testing.assert_allclose(top[:, 0], 0.01)
-    np.testing.assert_allclose(np.unique(np.round(top[:, 1], 9)), [-0.01, 0.0, 0.01], atol=1e-9)
-    np.testing.assert_allclose(
-        np.unique(np.round(top[:, 2], 9)), [-0.02, -0.01, 0.0, 0.01, 0.02], atol=1e-9
-    )
 
 
 def test_what_another_shape_of_the_link_covers_has_no_taxel() -> None:
