@@ -1,4 +1,4 @@
-"""Whether an arm touches anything: the clutter, the board, or the robot's own body."""
+"""Collision checks of the arm with clutter, board and the robot's own body."""
 
 from dataclasses import replace
 from typing import cast
@@ -14,14 +14,10 @@ from lic_drake.types import Vector
 
 
 def is_touching(scene: Scene, root: Context) -> bool:
-    """Returns whether the arm touches anything, in a context of the diagram that has the scene."""
-    query = cast(
-        QueryObject,
-        scene.scene_graph.get_query_output_port().Eval(
-            scene.scene_graph.GetMyContextFromRoot(root)
-        ),
-    )
-    # Objects that an earlier reach pushed together touch each other, which does not matter.
+    """Returns whether the arm touches anything, in a root context of the scene's diagram."""
+    context = scene.scene_graph.GetMyContextFromRoot(root)
+    query = cast(QueryObject, scene.scene_graph.get_query_output_port().Eval(context))
+    # Objects that an earlier reach pushed together may touch each other.
     return bool(query.HasCollisions()) and any(
         pair.id_A in scene.skin_links or pair.id_B in scene.skin_links
         for pair in query.ComputePointPairPenetration()
@@ -29,52 +25,36 @@ def is_touching(scene: Scene, root: Context) -> bool:
 
 
 class CollisionChecker:
-    """A mobile robot in front of the fixed objects of an environment, all that it can see of it.
+    """A mobile robot in front of the fixed objects of an environment, all that it knows of it.
 
-    Args:
-        arm: The arm with the robot that carries it.
-        instance: The environment in W.
-        config: Gives the contact properties.
+    Stems, even fixed ones, are hidden by the board and left out.
 
     Attributes:
-        plant: Robot and objects, with the positions of `Arm.positions`; its geometry has only pairs
-            with the arm.
+        plant: Robot and objects, with the positions of `Arm.positions`; only collisions of the arm
+            are detected.
         plant_context: Its context, in which `touches` sets positions.
     """
 
     def __init__(self, arm: Arm, instance: ClutterInstance, config: SceneConfig) -> None:
         self._arm = arm
         builder = DiagramBuilder()
-        self._scene = add_scene(builder, arm, _fixed_part(instance), config, mobile=True)
-        self._forget_pairs_without_the_arm()
+        fixed = replace(instance.subset(np.flatnonzero(~instance.movable)), stems=None)
+        self._scene = add_scene(builder, arm, fixed, config, mobile=True)
+        others = GeometrySet([*self._scene.objects, *self._scene.body])
+        self._scene.scene_graph.collision_filter_manager().Apply(
+            CollisionFilterDeclaration().ExcludeWithin(others)
+        )
         self._diagram = builder.Build()
         self._root = self._diagram.CreateDefaultContext()
         self.plant = self._scene.plant
         self.plant_context = self.plant.GetMyMutableContextFromRoot(self._root)
 
     def touches(self, b0: Vector, q: Vector) -> bool:
-        """Returns whether the arm touches anything.
-
-        Args:
-            b0: Position of R, shape (3,), metres.
-            q: Joint angles, shape (m,), radians.
-        """
+        """Returns whether the arm touches anything, at b0 (3,), metres, and q (m,), radians."""
         positions = self._arm.positions(b0, q)
         self.plant.SetPositions(self.plant_context, self._scene.arm, positions)
         return is_touching(self._scene, self._root)
 
     def first_free(self, b0: Vector, angles: Vector) -> Vector | None:
-        """Returns the first of joint angles, shape (n, m), with which the arm touches nothing."""
+        """Returns the first collision-free joint angles of `angles`, shape (n, m)."""
         return next((q for q in angles if not self.touches(b0, q)), None)
-
-    def _forget_pairs_without_the_arm(self) -> None:
-        """Board and the rest of the robot may be as near to each other as they like."""
-        others = GeometrySet([*self._scene.objects, *self._scene.body])
-        self._scene.scene_graph.collision_filter_manager().Apply(
-            CollisionFilterDeclaration().ExcludeWithin(others)
-        )
-
-
-def _fixed_part(instance: ClutterInstance) -> ClutterInstance:
-    """Returns the fixed objects; stems, also fixed ones, are inside, where nobody can look."""
-    return replace(instance.subset(np.flatnonzero(~instance.movable)), stems=None)

@@ -1,4 +1,4 @@
-"""Contact: the arm wears a compliant skin, the clutter is rigid."""
+"""Contact properties: a compliant skin on the arm, rigid clutter."""
 
 from dataclasses import dataclass
 
@@ -13,24 +13,24 @@ from pydrake.multibody.plant import CoulombFriction
 from lic_drake.config import check_numbers
 
 MESH_RANGE_M = (1e-4, 10.0)
-"""Finest and coarsest contact mesh; a finer one would not fit into memory."""
+"""Range of contact mesh sizes; a finer mesh would not fit into memory."""
 
 _SKIN_FRICTION = 1e6
-# Drake combines two coefficients to 2 a b / (a + b), which is at most 2 b. A skin with a very
-# large coefficient therefore gives every arm-object pair twice the object's own: 0.4 against
-# 0.2 between objects, the two values of the authors' simulator.
+# Drake combines two coefficients to 2 a b / (a + b). A skin with a very large coefficient gives
+# every arm-object pair twice the object's own: 0.4, against 0.2 between objects, the values of the
+# authors' simulator.
 
 
 @dataclass(kw_only=True)
 class ContactConfig:
-    """Contact parameters; every default has its reason in the scenario files."""
+    """Contact parameters; the scenario files explain the defaults."""
 
-    # Modulus of the arm's skin, Pa: with the meshes below a link pressed on a cylinder is as
-    # stiff as the authors' contact spring, 48 kN/m.
+    # Modulus of the arm's skin, Pa: with the meshes below, a link against a cylinder is as stiff as
+    # the authors' contact spring, 48 kN/m.
     skin_modulus_Pa: float = 1e8
     # Hunt & Crossley dissipation of skin and objects, s/m.
     dissipation_s_per_m: float = 1.0
-    # Friction between two objects; between arm and object it is twice that (authors' simulator).
+    # Friction between two objects, half of that between arm and object (authors' simulator).
     object_friction: float = 0.2
     # Stiffness of the point contact between two objects, N/m (authors' simulator: 48 kN/m;
     # two equal springs in series).

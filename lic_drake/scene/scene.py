@@ -31,40 +31,36 @@ from lic_drake.errors import ScenarioError
 from lic_drake.robots.arm import Arm
 from lic_drake.scene.contact import ContactConfig, object_properties, skin_properties
 from lic_drake.scene.looks import object_color
-from lic_drake.scene.movables import add_movable
-from lic_drake.scene.stems import add_stems
+from lic_drake.scene.movables import add_movable, add_stems
 from lic_drake.types import Vector
 
 TIME_STEP_RANGE_S = (1e-5, 0.1)
-"""Shortest and longest step of a discrete plant."""
-
+"""Range of a discrete plant's step."""
 CONTACT_APPROXIMATIONS = ("sap", "similar", "lagged")
-"""Drake's names for the ways in which a discrete plant solves contact."""
-
-
+"""Drake's contact approximations for discrete plants."""
 STEP_SLACK = 1e-9
-"""Relative slack on the longest step. Without it, round-off added a fifth, near-zero step to every
+"""Relative slack on the maximum step. Without it, round-off added a fifth, near-zero step to every
 other control period of four steps."""
 
 
 @dataclass(kw_only=True)
 class SceneConfig:
-    """How the world is simulated."""
+    """Simulation parameters."""
 
     # Step of a discrete plant, seconds; 0 makes the plant continuous for the error-controlled
-    # CENIC integrator, which costs less than steps of 5 ms and resolves impacts better.
+    # CENIC integrator, which is faster than steps of 5 ms and resolves impacts better.
     time_step_s: float = 0.0
-    # Accuracy of CENIC, and its largest step in seconds: without one, an impact within a long
-    # step shows as a single force of hundreds of newtons.
+    # Accuracy of CENIC, and its maximum step, seconds: without one, an impact within a long step
+    # appears as a single force of hundreds of newtons.
     cenic_accuracy: float = 1e-4
     cenic_max_step_s: float = 0.01
     # Contact approximation of a discrete plant.
     contact_approximation: str = "lagged"
-    # Dry friction of a movable object on the ground, N (authors' simulator), and the speed up to
-    # which it grows, m/s.
+    # Dry friction of a movable object on the ground, N (authors' simulator), and the speed at which
+    # it saturates, m/s.
     ground_friction_N: float = 2.0
     ground_creep_m_per_s: float = 1e-3
-    # Viscous drag of a floating object, N s/m: 0.1 kg whose velocity halves every 1 ms.
+    # Viscous drag of a floating object, N s/m: the velocity of 0.1 kg halves every 1 ms.
     drag_N_s_per_m: float = 69.3
     # Density of the skin's sensors, 1/m (paper V-A: 100 in the plane).
     taxels_per_m: float = 100.0
@@ -74,37 +70,32 @@ class SceneConfig:
         shortest, longest = TIME_STEP_RANGE_S
         if self.time_step_s != 0.0 and not shortest <= self.time_step_s <= longest:
             raise ScenarioError(
-                f"time_step_s must be from {shortest:g} to {longest:g}, or 0 for a continuous"
-                f" plant, got {self.time_step_s}"
+                f"time_step_s must be from {shortest:g} to {longest:g}, or 0,"
+                f" got {self.time_step_s}"
             )
         if self.contact_approximation not in CONTACT_APPROXIMATIONS:
             raise ScenarioError(
                 f"contact_approximation must be one of {', '.join(CONTACT_APPROXIMATIONS)},"
                 f" got {self.contact_approximation!r}"
             )
-        check_numbers(
-            self,
-            positive=(
-                *("cenic_accuracy", "cenic_max_step_s", "ground_friction_N"),
-                *("ground_creep_m_per_s", "drag_N_s_per_m", "taxels_per_m"),
-            ),
-        )
+        names = "cenic_accuracy cenic_max_step_s ground_friction_N ground_creep_m_per_s"
+        check_numbers(self, positive=[*names.split(), "drag_N_s_per_m", "taxels_per_m"])
 
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """What the sensor, the controller and the rollout need to know of the plant.
+    """A finalized plant and what is in it.
 
     Attributes:
-        plant: The finalized plant.
+        plant: The plant.
         scene_graph: Its scene graph.
-        arm: Its model instance.
-        clutter: Model instance of the movable objects.
+        arm: Model instance of the robot.
+        clutter: Model instance of the movable objects and stems.
         skin_links: Skin geometry -> index into the arm's link names.
-        body: Collision geometry of the rest of the robot, which has no skin.
+        body: Collision geometry of the rest of the robot.
         objects: Collision geometry of each object of the instance.
         robot: The arm.
-        num_axes: In how many directions its movable objects move, or its stems bend.
+        num_axes: Degrees of freedom of a movable object, see `ClutterInstance`.
     """
 
     plant: MultibodyPlant
@@ -129,11 +120,17 @@ def add_scene(
 ) -> Scene:
     """Adds a plant with the arm and the clutter, and its scene graph, to a builder.
 
-    Movable objects only translate, in the ground plane or, floating, in space: the friction torque
-    of the authors' planar objects is larger than any contact torque, so they never spin. See
-    `lic_drake.scene.movables` for what resists them. Stems bend at their roots. Unless `visuals`,
-    the objects cannot be seen, which saves a quarter of the time that building takes. With
-    `mobile` the robot has the positions of `Arm.positions`; for `height_m` see `Arm.add_to_plant`.
+    Movable objects only translate, in the ground plane or in space: the friction torque of the
+    authors' planar objects exceeds any contact torque, so that they never spin.
+
+    Args:
+        builder: The builder.
+        arm: The arm.
+        instance: The clutter.
+        config: Simulation parameters.
+        visuals: Whether objects have visual geometry, which takes a third more time to build.
+        mobile: Whether the robot has the positions of `Arm.positions`.
+        height_m: See `Arm.add_to_plant`.
     """
     plant, scene_graph = AddMultibodyPlant(
         MultibodyPlantConfig(
@@ -146,7 +143,7 @@ def add_scene(
     )
     plant.mutable_gravity_field().set_gravity_vector(np.zeros(3))
     arm_instance = arm.add_to_plant(plant, mobile=mobile, height_m=height_m)
-    skin_links = _wear_skin(plant, scene_graph, arm, arm_instance, config.contact)
+    skin_links = _add_skin(plant, scene_graph, arm, arm_instance, config.contact)
     clutter = plant.AddModelInstance("clutter")
     objects: list[GeometryId] = []
     surroundings = _add_surroundings(plant)
@@ -186,17 +183,23 @@ def add_scene(
             visuals,
         )
     plant.Finalize()
-    # Dry friction and springs are actuators that always want to stand still at 0.
+    # Dry friction and springs are actuators whose desired state is 0.
     at_rest = plant.get_desired_state_input_port(clutter)
     standstill = ConstantVectorSource(np.zeros(at_rest.size()))
     builder.Connect(builder.AddNamedSystem("standstill", standstill).get_output_port(), at_rest)
+    body_geometry = tuple(
+        geometry
+        for index in plant.GetBodyIndices(arm_instance)
+        for geometry in plant.GetCollisionGeometriesForBody(plant.get_body(index))
+        if geometry not in skin_links
+    )
     return Scene(
         plant=plant,
         scene_graph=scene_graph,
         arm=arm_instance,
         clutter=clutter,
         skin_links=skin_links,
-        body=_find_body(plant, arm_instance, skin_links),
+        body=body_geometry,
         objects=tuple(objects),
         robot=arm,
         num_axes=instance.num_axes,
@@ -206,12 +209,12 @@ def add_scene(
 def make_simulator(
     diagram: Diagram, config: SceneConfig, context: Context | None = None
 ) -> Simulator:
-    """Returns a simulator of a diagram with a scene, with the integrator that its plant needs.
+    """Returns a simulator of a diagram with a scene, with the integrator that the plant needs.
 
     Args:
         diagram: The diagram.
-        config: Says whether the plant is discrete or integrated by CENIC.
-        context: A context of the diagram; by default a new one.
+        config: The scene's parameters.
+        context: A context of the diagram; a new one by default.
     """
     context = diagram.CreateDefaultContext() if context is None else context
     simulator = Simulator(diagram, context)
@@ -224,12 +227,12 @@ def make_simulator(
             start_time=context.get_time(),
         )
         ApplySimulatorConfig(simulator_config, simulator)
-        # Not a tenth of it: nearly all steps are as long as they may be.
+        # Instead of a tenth of it: nearly all steps have the maximum length.
         simulator.get_mutable_integrator().request_initial_step_size_target(longest_s)
     return simulator
 
 
-def _wear_skin(
+def _add_skin(
     plant: MultibodyPlant,
     scene_graph: SceneGraph,
     arm: Arm,
@@ -249,23 +252,11 @@ def _wear_skin(
     return skin_links
 
 
-def _find_body(
-    plant: MultibodyPlant, robot: ModelInstanceIndex, skin_links: dict[GeometryId, int]
-) -> tuple[GeometryId, ...]:
-    """Returns the collision geometry of a robot that is not skin."""
-    return tuple(
-        geometry
-        for body in plant.GetBodyIndices(robot)
-        for geometry in plant.GetCollisionGeometriesForBody(plant.get_body(body))
-        if geometry not in skin_links
-    )
-
-
 def _add_surroundings(plant: MultibodyPlant) -> RigidBody:
-    """Adds a body for what is fixed.
+    """Adds a welded body for fixed objects.
 
-    Not the world's: Drake 1.58 finds no contacts with geometry of the world that `ChangeShape` has
-    moved (`lic_drake.reach.sleeping`), since it is still looked for where it was.
+    The world body will not do: Drake 1.58 finds no contacts with geometry of the world that
+    `ChangeShape` has moved (`lic_drake.reach.sleeping`).
     """
     body = plant.AddRigidBody(
         "surroundings",

@@ -107,21 +107,6 @@ def test_two_objects_meet_in_point_contact_and_their_friction_is_measured_as_0_2
         assert (abs(world.object_velocities[0, 1]) > 0.1) == sliding
 
 
-def test_the_arm_does_not_pass_through_a_fixed_object() -> None:
-    R_RL, p_RL = ARM.calc_pose(BENT)[:2]
-    normal, along = R_RL[2, :, 0], -R_RL[2, :, 1]
-    centre = p_RL[2] + 0.2 * along + 0.028 * normal
-    contact = ContactConfig(skin_modulus_Pa=1e8, skin_mesh_m=0.005, object_mesh_m=0.004)
-    world = make_world(
-        BENT, make_clutter(cylinder(*centre[:2])), SceneConfig(time_step_s=0.005, contact=contact)
-    )
-    world.set_equilibrium(BENT + np.linalg.pinv(ARM.calc_pose(BENT).Jv_E) @ (0.08 * normal))
-    world.advance(4.0)
-    R_RL, p_RL = ARM.calc_pose(world.q)[:2]
-    gap = (centre - p_RL[2]) @ R_RL[2, :, 0] - 0.025
-    assert -1e-3 < gap < 0.0
-
-
 def wall_ahead(distance: float) -> ClutterInstance:
     """A wall of a passage, 2 cm thick, across the way of the hand and in front of its tip."""
     along = -ARM.calc_pose(BENT)[:2][0][2, :, 1]

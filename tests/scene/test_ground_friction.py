@@ -72,23 +72,3 @@ def test_an_object_pushed_off_its_centre_moves_but_never_spins() -> None:
     assert X_WO.translation()[0] > 0.7
     np.testing.assert_array_equal(X_WO.rotation().matrix(), np.eye(3))
     assert X_WO.translation()[2] == 0.0
-
-
-def test_a_fixed_object_holds_a_movable_one_that_is_pressed_on_it() -> None:
-    clutter = make_clutter(cylinder(0.6, 0.0), cylinder(0.579, 0.0, movable=True))
-    world = make_world(PARKED, clutter, SceneConfig(time_step_s=0.0025))
-    world.push("object1", np.zeros(3), np.array([20.0, 0.0, 0.0]))
-    world.advance(1.0)
-    # 20 N less the ground's friction on a spring of 48 kN/m: 0.4 mm.
-    penetration = world.objects[0, 0] - (0.6 - 0.02)
-    assert 0.0 < penetration < 1e-3
-    assert penetration == pytest.approx(20.0 / 4.8e4, rel=0.1)
-
-
-def test_a_pushed_object_pushes_the_next_one() -> None:
-    clutter = make_clutter(cylinder(0.6, 0.0, movable=True), cylinder(0.579, 0.0, movable=True))
-    world = make_world(PARKED, clutter, SceneConfig(time_step_s=0.0025))
-    world.push("object1", np.zeros(3), np.array([9.0, 0.0, 0.0]))
-    world.advance(0.3)
-    expected = (9.0 - 2.0 * AXIS_LIMIT) / 2.0 * 0.3
-    np.testing.assert_allclose(world.object_velocities[:, 0], expected, rtol=0.03)

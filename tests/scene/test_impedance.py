@@ -14,7 +14,7 @@ MASS = np.array([2.835, 2.3, 1.32])
 INERTIA = np.array([0.011214, 0.024175, 0.009533])
 COM = np.array([0.098, 0.167, 0.1365])
 LENGTH = np.array([0.196, 0.334])
-TIME_STEPS = [0.0005, 0.001, 0.0025, 0.005]
+TIME_STEPS = [0.0005, 0.005]
 
 
 def mass_matrix_and_bias(q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -81,30 +81,6 @@ def test_the_step_response_agrees_with_an_integration_of_the_equations_of_motion
         world.simulator.AdvanceTo(time)
         # First order in the step: 0.12 rad/s at most, of steps of 0.3 rad.
         np.testing.assert_allclose(world.q, expected, atol=0.2 * time_step)
-
-
-def test_a_small_disturbance_decays_with_the_slowest_pole_of_the_linearised_arm() -> None:
-    q = np.deg2rad([4.0, 70.0, 106.0])
-    M, _ = mass_matrix_and_bias(q, np.zeros(3))
-    A = np.block(
-        [
-            [np.zeros((3, 3)), np.eye(3)],
-            [-np.linalg.solve(M, np.diag(K)), -np.linalg.solve(M, np.diag(D))],
-        ]
-    )
-    # Heavily damped: a reach follows its equilibrium angles half a second late.
-    poles = np.sort(np.linalg.eigvals(A).real)
-    np.testing.assert_allclose(poles[-3:], [-2.2, -2.0, -1.9], atol=0.06)
-    world = make_world(q, make_clutter(), SceneConfig(time_step_s=0.001))
-    slow = np.linalg.eig(A)
-    mode = np.argmax(slow.eigenvalues.real)
-    shape = slow.eigenvectors[:3, mode].real
-    world.set_equilibrium(q + 0.01 * shape)
-    world.advance(1.0)
-    first = np.linalg.norm(world.q - q - 0.01 * shape)
-    world.advance(1.0)
-    second = np.linalg.norm(world.q - q - 0.01 * shape)
-    assert np.log(second / first) == pytest.approx(slow.eigenvalues[mode].real, rel=0.03)
 
 
 @pytest.mark.parametrize("joint", [0, 1, 2])

@@ -1,5 +1,4 @@
 import numpy as np
-import pytest
 from pydrake.systems.analysis import ApplySimulatorConfig, SimulatorConfig
 from support.worlds import World, make_world
 
@@ -55,16 +54,3 @@ def test_a_pushed_spheres_velocity_halves_every_millisecond() -> None:
     np.testing.assert_allclose(velocity(world), 0.5 * first, rtol=0.04)
     world.advance(0.05)
     np.testing.assert_allclose(position(world) - P_WO, first * MASSES / DRAG, rtol=1e-6)
-
-
-@pytest.mark.parametrize("time_step_s", [0.0, 5e-3])
-def test_a_constant_push_moves_a_sphere_at_force_over_drag(time_step_s: float) -> None:
-    world = world_of(time_step_s)
-    force = np.array([3.0, -1.0, 2.0])
-    world.push("object0", np.zeros(3), force)
-    world.advance(0.1)
-    before = position(world)
-    world.advance(0.2)
-    np.testing.assert_allclose(velocity(world), force / DRAG, rtol=1e-4)
-    # A discrete plant may have taken one of its 40 steps more.
-    np.testing.assert_allclose(position(world) - before, 0.2 * force / DRAG, rtol=0.026)

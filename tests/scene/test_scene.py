@@ -1,11 +1,10 @@
 import numpy as np
-import pytest
-from pydrake.geometry import Box, Cylinder, Role, Sphere
+from pydrake.geometry import Box, Cylinder, Role
 from pydrake.systems.analysis import ApplySimulatorConfig, SimulatorConfig
 from pydrake.systems.framework import DiagramBuilder
 from support.worlds import ARM, box, cylinder, make_clutter, make_world
 
-from lic_drake.scene.scene import SceneConfig, add_scene, make_shape
+from lic_drake.scene.scene import SceneConfig, add_scene
 
 PARKED = np.deg2rad([-140.0, 100.0, 120.0])
 CLUTTER = make_clutter(
@@ -57,11 +56,6 @@ def test_only_movable_objects_have_a_body_with_their_mass() -> None:
     assert not plant.HasBodyNamed("object3")
 
 
-def test_movable_objects_come_in_their_order_in_the_clutter_state() -> None:
-    world = make_world(PARKED, CLUTTER, SceneConfig())
-    np.testing.assert_array_equal(world.objects, CLUTTER.p_WO[CLUTTER.movable, :2])
-
-
 def test_a_robot_stands_at_the_origin_unless_it_is_placed() -> None:
     for p_WR in (np.zeros(3), np.array([0.1, -0.4, 0.0])):
         builder = DiagramBuilder()
@@ -92,20 +86,6 @@ def test_nothing_moves_by_itself_in_the_horizontal_plane() -> None:
     np.testing.assert_array_equal(world.scene.plant.gravity_field().gravity_vector(), np.zeros(3))
     world.advance(1.0)
     np.testing.assert_allclose(world.q, PARKED, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("name", "size", "kind"),
-    [
-        ("cylinder", (0.01, 0.2, 0.0), Cylinder),
-        ("box", (1.0, 2.0, 3.0), Box),
-        ("sphere", (0.05, 0.0, 0.0), Sphere),
-    ],
-)
-def test_each_shape_name_has_its_drake_shape(
-    name: str, size: tuple[float, ...], kind: type
-) -> None:
-    assert isinstance(make_shape(name, np.array(size)), kind)
 
 
 def test_the_continuous_plant_with_cenic_agrees_with_small_discrete_steps() -> None:
