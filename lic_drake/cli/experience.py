@@ -13,8 +13,7 @@ from lic_drake.cli import exit_codes
 from lic_drake.cli.arguments import Subparsers, add_json_argument, library_path, positive_int
 
 if TYPE_CHECKING:
-    from lic_drake.experience.check import LibraryReport
-    from lic_drake.experience.summary import LibrarySummary
+    from lic_drake.experience.check import LibraryReport, LibrarySummary
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -135,8 +134,8 @@ def _number(text: str) -> float:
 
 def run_info(args: argparse.Namespace) -> int:
     """Prints a library's summary."""
+    from lic_drake.experience.check import summarize
     from lic_drake.experience.store import ExperienceLibrary
-    from lic_drake.experience.summary import summarize
 
     summary = summarize(ExperienceLibrary(args.library))
     if args.json:

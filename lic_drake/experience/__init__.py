@@ -5,5 +5,5 @@
 - `runner`: `simulate(requests, library, workers)`, one environment a task and one shard, wherever
   reaches are simulated: collection, evaluation, bounds, second attempts. It runs on `workers`,
   processes of this machine, or on `dask_workers`, those of a Dask cluster.
-- `add`: rows of a real robot; `pairs`: D2 from D1; `check`, `summary`, `merge`: housekeeping.
+- `add`: rows of a real robot; `pairs`: D2 from D1; `check`: reports.
 """

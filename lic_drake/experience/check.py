@@ -1,6 +1,5 @@
-"""Checks of a library: what it lacks, what is damaged, and whether its rows come out again."""
+"""Reports on a library: its contents, its faults, and whether its rows can be reproduced."""
 
-import math
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, fields
@@ -10,28 +9,29 @@ import numpy as np
 from lic_drake.errors import LibraryError
 from lic_drake.experience.collect import CollectionRequest
 from lic_drake.experience.runner import ReachFunction
-from lic_drake.experience.schema import read_header, read_table
+from lic_drake.experience.schema import read_shard
 from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.intervals import wilson_interval
 from lic_drake.reach.request import SIMULATION, ReachRecord, ReachRequest
 from lic_drake.reach.session import run_reach
 
 NOT_COMPARED = ("wall_time_s", "lic_drake_version", "drake_version", "weight")
-"""What a repetition may change without being another reach."""
+"""Fields that `recompute` ignores."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LibraryReport:
-    """What `check_library` found.
+    """Result of `check_library`.
 
     Attributes:
         shards: Number of Parquet files.
         reaches: Number of rows in the readable ones.
-        damaged: Names of Parquet files that cannot be read, and why, in a line.
+        damaged: Names of unreadable Parquet files, with the reason in one line.
         scenarios: Digests of the scenarios in the library; more than one is an error.
-        duplicates: Keys of reaches that the library holds more than once, sorted.
-        requested: Number of reaches of the request; None without a request.
-        missing: Number of reaches of the request that no shard holds; None without a request.
-        incomplete: Indices of the environments of the request that lack reaches.
+        duplicates: Keys of reaches that occur more than once, sorted.
+        requested: Number of requested reaches; None without a request.
+        missing: Number of requested reaches that no shard holds; None without a request.
+        incomplete: Indices of the requested environments that lack reaches.
     """
 
     shards: int
@@ -45,23 +45,19 @@ class LibraryReport:
 
     @property
     def is_sound(self) -> bool:
-        """Whether the library is whole, without contradictions and complete."""
-        return (
-            not self.damaged
-            and not self.duplicates
-            and len(self.scenarios) <= 1
-            and not self.missing
-        )
+        """Whether the library is readable, complete, and free of duplicates and mixed scenarios."""
+        faults = self.damaged or self.duplicates or self.missing
+        return not faults and len(self.scenarios) <= 1
 
 
 def check_library(
     library: ExperienceLibrary, request: CollectionRequest | None = None
 ) -> LibraryReport:
-    """Reads every file of a library in full and reports what is wrong with it.
+    """Reads every file of a library in full and reports all faults.
 
     Args:
         library: The library.
-        request: What it should hold; None leaves completeness open.
+        request: Its intended contents; None skips the completeness check.
 
     Raises:
         LibraryError: There is no library.
@@ -72,18 +68,18 @@ def check_library(
     keys: Counter[str] = Counter()
     for path in paths:
         try:
-            keys.update(read_table(path).column("key").to_pylist())
-            scenarios.add(read_header(path).scenario_digest)
+            header, table = read_shard(path)
         except LibraryError as error:
             damaged[path.name] = str(error)
-    lacking: dict[int, int] = {}
+            continue
+        keys.update(table.column("key").to_pylist())
+        scenarios.add(header.scenario_digest)
+    lacking: Counter[int] = Counter()
     requested = 0
-    if request is not None:
-        for environment in request.environment_indices:
-            wanted = [item.key for item in request.reaches(environment)]
-            requested += len(wanted)
-            if missing := sum(key not in keys for key in wanted):
-                lacking[environment] = missing
+    for reach in request.all_reaches() if request is not None else ():
+        requested += 1
+        if reach.key not in keys:
+            lacking[reach.environment] += 1
     return LibraryReport(
         shards=len(paths),
         reaches=keys.total(),
@@ -91,19 +87,19 @@ def check_library(
         scenarios=tuple(sorted(scenarios)),
         duplicates=tuple(sorted(key for key, count in keys.items() if count > 1)),
         requested=None if request is None else requested,
-        missing=None if request is None else sum(lacking.values()),
+        missing=None if request is None else lacking.total(),
         incomplete=tuple(lacking),
     )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Difference:
-    """A row that came out otherwise.
+    """A row that was not reproduced.
 
     Attributes:
-        key: Its key.
+        key: Key of the reach.
         fields: Names of the fields that differ in any bit.
-        outcomes: Outcome in the library, and of the repetition.
+        outcomes: Outcome in the library and of the new simulation.
     """
 
     key: str
@@ -119,41 +115,131 @@ def recompute(
     reach: ReachFunction = run_reach,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Difference]:
-    """Simulates random simulated rows of a library again: a record is a function of its request.
+    """Simulates randomly drawn simulated rows again and compares them bit for bit.
 
-    Equality to the last bit may be asked for on the machine that collected the library: other
-    processors round otherwise, and contact makes much of little.
+    Bitwise equality can only be expected on the machine that collected the library: other
+    processors round differently, and contact amplifies small differences.
 
     Args:
         library: The library.
         count: Number of rows to draw without replacement; all of them if there are fewer.
-        rng: Draws them.
+        rng: Draws the rows.
         reach: Simulates a request.
-        progress: Is called after each row with the number of rows done and in all.
+        progress: Called after each row with the number of rows done and the total.
 
     Returns:
-        The rows that differ, environment by environment.
+        The rows that differ, grouped by environment.
 
     Raises:
-        LibraryError: The library is empty, or cannot be read.
+        LibraryError: The library is empty or cannot be read.
     """
     scenario = library.scenario()
     rows = [row for row in library.records() if row.source == SIMULATION]
     drawn = [rows[i] for i in rng.choice(len(rows), min(count, len(rows)), replace=False)]
-    # An environment's diagrams are built once.
+    # Diagrams are cached per environment.
     drawn.sort(key=lambda row: (row.stream, row.environment))
+    names = [item.name for item in fields(ReachRecord) if item.name not in NOT_COMPARED]
     differing: list[Difference] = []
     for done, row in enumerate(drawn, start=1):
         again = reach(ReachRequest.from_record(row, scenario))
-        names = [f.name for f in fields(ReachRecord) if f.name not in NOT_COMPARED]
-        if others := tuple(n for n in names if not _is_same(getattr(row, n), getattr(again, n))):
+        # As text, so that NaN equals NaN.
+        if others := tuple(n for n in names if repr(getattr(row, n)) != repr(getattr(again, n))):
             outcomes = (row.outcome, again.outcome)
             differing.append(Difference(key=row.key, fields=others, outcomes=outcomes))
         progress(done, len(drawn))
     return differing
 
 
-def _is_same(a: object, b: object) -> bool:
-    """Returns whether two values are equal; NaN equals itself."""
-    both_nan = isinstance(a, float) and isinstance(b, float) and math.isnan(a) and math.isnan(b)
-    return both_nan or a == b
+@dataclass(frozen=True, kw_only=True)
+class SourceSummary:
+    """The rows of one source other than simulation; `weights` are its distinct ones, sorted."""
+
+    source: str
+    reaches: int
+    successes: int
+    weights: tuple[float, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LibrarySummary:
+    """Contents of a library. All but `shards` and `added` describe its simulated reaches.
+
+    Attributes:
+        scenario: Digest of the scenario.
+        environments: Number of distinct environments; likewise `goals` and `starts` (hand poses).
+        success_rate: Fraction of successes; NaN without any reach.
+        success_interval: Wilson 90 % interval of the success rate.
+        outcomes: Outcome -> number of reaches, most frequent first.
+        simulated_s: Total simulated time, seconds.
+        wall_time_s: Total wall time, seconds.
+        added: Rows of other sources, by source.
+    """
+
+    category: str
+    robot: str
+    scenario: str
+    shards: int
+    reaches: int
+    streams: tuple[str, ...]
+    environments: int
+    goals: int
+    starts: int
+    successes: int
+    success_rate: float
+    success_interval: tuple[float, float]
+    outcomes: dict[str, int]
+    simulated_s: float
+    wall_time_s: float
+    lic_drake_versions: tuple[str, ...]
+    drake_versions: tuple[str, ...]
+    added: tuple[SourceSummary, ...]
+
+
+def summarize(library: ExperienceLibrary) -> LibrarySummary:
+    """Summarizes a library.
+
+    Raises:
+        LibraryError: There is no library, it is empty, or it cannot be read.
+    """
+    scenario, columns = library.scenario(), library.columns()
+    by_source = {
+        source: {name: values[columns["source"] == source] for name, values in columns.items()}
+        for source in sorted({SIMULATION, *columns["source"]})
+    }
+    simulated = by_source.pop(SIMULATION)
+    reaches, successes = len(simulated["key"]), int(simulated["success"].sum())
+
+    def count_distinct(*names: str) -> int:
+        return len(set(zip(*(simulated[name] for name in names), strict=True)))
+
+    def distinct(name: str) -> tuple[str, ...]:
+        return tuple(sorted(set(simulated[name])))
+
+    return LibrarySummary(
+        category=scenario.category,
+        robot=scenario.robot,
+        scenario=scenario.digest,
+        shards=len(library.shard_paths()),
+        reaches=reaches,
+        streams=distinct("stream"),
+        environments=count_distinct("stream", "environment"),
+        goals=count_distinct("goal_x", "goal_y", "goal_z"),
+        starts=count_distinct("start_x", "start_y", "start_z", "start_phi"),
+        successes=successes,
+        success_rate=successes / reaches if reaches else float("nan"),
+        success_interval=wilson_interval(successes, reaches),
+        outcomes=dict(Counter(map(str, simulated["outcome"])).most_common()),
+        simulated_s=float(simulated["duration_s"].sum()),
+        wall_time_s=float(simulated["wall_time_s"].sum()),
+        lic_drake_versions=distinct("lic_drake_version"),
+        drake_versions=distinct("drake_version"),
+        added=tuple(
+            SourceSummary(
+                source=source,
+                reaches=len(rows["key"]),
+                successes=int(rows["success"].sum()),
+                weights=tuple(sorted(set(rows["weight"].tolist()))),
+            )
+            for source, rows in by_source.items()
+        ),
+    )

@@ -15,7 +15,7 @@ from typing import Any
 
 import lic_drake
 from lic_drake.errors import ClusterError, LibraryError, LicError
-from lic_drake.experience.schema import read_table, to_records
+from lic_drake.experience.schema import read_shard, to_records
 from lic_drake.experience.store import WHOLE, ExperienceLibrary, Share
 from lic_drake.experience.workers import ThisProcess, Workers
 from lic_drake.reach.request import ReachRecord, ReachRequest
@@ -216,7 +216,7 @@ def add_to_shard(
         LibraryError: The old shard is damaged, or the system refuses.
     """
     path = library.shard_path(name)
-    old = to_records(read_table(path)) if path.exists() else []
+    old = to_records(read_shard(path)[1]) if path.exists() else []
     keys = {record.key for record in old}
     new = [record for record in records if record.key not in keys]
     library.write_shard(name, [*old, *new], scenario)

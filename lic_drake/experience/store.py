@@ -18,8 +18,7 @@ from lic_drake.experience.files import readable_errors, write_atomically
 from lic_drake.experience.schema import (
     TableHeader,
     make_header,
-    read_header,
-    read_table,
+    read_shard,
     to_records,
     to_table,
     write_table,
@@ -28,22 +27,22 @@ from lic_drake.reach.request import ReachRecord
 from lic_drake.reach.scenario import Scenario, parse_scenario
 
 SUFFIX = ".parquet"
-"""End of a shard's file name."""
+"""Suffix of shards."""
 
 COMPACTED = "reaches"
-"""Name of the shard that holds all rows after `ExperienceLibrary.compact`."""
+"""Name of the shard that `ExperienceLibrary.compact` writes."""
 
 PATIENCE_S = 1.0
-"""A lock that is only looked at by others is free within this time, seconds."""
+"""Another process may hold a lock briefly, just to test it; wait this long, seconds."""
 
 
 @dataclass(frozen=True)
 class Share:
-    """Every `count`-th environment of a collection, from the `index`-th on: a job of a job array.
+    """One of `count` parts of a collection, for job arrays: every count-th environment.
 
     Attributes:
-        index: Which share, 1 to `count`.
-        count: Number of shares.
+        index: Number of this part, 1 to `count`.
+        count: Number of parts.
 
     Raises:
         RequestError: The index is out of range.
@@ -54,23 +53,17 @@ class Share:
 
     def __post_init__(self) -> None:
         if not 1 <= self.index <= self.count:
-            raise RequestError(
-                f"a share is k/n with k from 1 to n, got {self}; start the job array at 1"
-            )
+            raise RequestError(f"a share is k/n with k from 1 to n, for instance 3/20, got {self}")
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """Reads "k/n".
-
-        Raises:
-            RequestError: The text is something else.
-        """
-        index, _, count = text.partition("/")
-        if not (index.isdecimal() and count.isdecimal()):
+        """Parses "k/n"; raises a RequestError if that fails."""
+        numbers = re.fullmatch(r"(\d+)/(\d+)", text)
+        if numbers is None:
             raise RequestError(
                 f"a share is k/n with k from 1 to n, for instance 3/20, got {quoted(text)}"
             )
-        return cls(int(index), int(count))
+        return cls(*map(int, numbers.groups()))
 
     def __str__(self) -> str:
         return f"{self.index}/{self.count}"
@@ -87,9 +80,9 @@ WHOLE = Share()
 class ExperienceLibrary:
     """Reaches of one scenario: a folder of shards, or a single Parquet file.
 
-    Opening reads nothing; every call looks at the files as they are then, and raises a LibraryError
-    if there are none, one is damaged, or they hold different scenarios. The folder also opens with
-    `pandas.read_parquet`. Shards are only ever added or replaced as a whole.
+    Nothing is cached: each call reads the current files, and raises a LibraryError if there are
+    none, one is damaged, or they hold different scenarios. `pandas.read_parquet` also opens the
+    folder. Shards are only added or replaced as a whole.
 
     Attributes:
         path: The folder or file.
@@ -99,7 +92,7 @@ class ExperienceLibrary:
         self.path = Path(path)
 
     def shard_paths(self) -> list[Path]:
-        """Returns the library's Parquet files, sorted by name; perhaps none."""
+        """Returns the library's Parquet files, sorted by name."""
         with readable_errors(self.path, "read"):
             if self.path.is_file():
                 return [self.path]
@@ -113,39 +106,42 @@ class ExperienceLibrary:
                 if path.suffix == SUFFIX and not path.name.startswith((".", "_"))
             )
 
+    def _read(self, columns: list[str] | None) -> list[tuple[TableHeader, pa.Table]]:
+        """Reads all shards, which must agree on the scenario."""
+        paths = self.shard_paths()
+        shards = [read_shard(path, columns) for path in paths]
+        for path, (header, _) in zip(paths, shards, strict=True):
+            if header.scenario_digest != shards[0][0].scenario_digest:
+                raise LibraryError(
+                    f"{paths[0]} and {path} hold different scenarios"
+                    f" ({shards[0][0].scenario_digest} and {header.scenario_digest});"
+                    " keep one library per scenario"
+                )
+        return shards
+
     @property
     def num_reaches(self) -> int:
         """Number of rows, read from the shards' footers."""
-        return sum(len(read_table(path, [])) for path in self.shard_paths())
+        return sum(len(table) for _, table in self._read([]))
 
     def successes(self) -> dict[str, bool]:
-        """Returns the key of every reach in the library, and whether it reached its goal."""
+        """Returns the key of every reach, and whether it succeeded."""
         found: dict[str, bool] = {}
-        for path in self.shard_paths():
-            table = read_table(path, ["key", "success"])
-            keys, successes = (column.to_pylist() for column in table.columns)
-            found.update(zip(keys, successes, strict=True))
+        for _, table in self._read(["key", "success"]):
+            found.update(zip(*(column.to_pylist() for column in table.columns), strict=True))
         return found
 
     def header(self) -> TableHeader:
-        """Returns the metadata of the shards, which must agree on the scenario."""
-        paths = self.shard_paths()
-        if not paths:
+        """Returns the metadata of the shards."""
+        shards = self._read([])
+        if not shards:
             raise LibraryError(
                 f"{self.path} holds no reaches yet; add some with: lic collect {self.path}"
             )
-        headers = [read_header(path) for path in paths]
-        for path, header in zip(paths, headers, strict=True):
-            if header.scenario_digest != headers[0].scenario_digest:
-                raise LibraryError(
-                    f"{paths[0]} and {path} hold different scenarios"
-                    f" ({headers[0].scenario_digest} and {header.scenario_digest});"
-                    " keep one library per scenario"
-                )
-        return headers[0]
+        return shards[0][0]
 
     def scenario(self) -> Scenario:
-        """Returns the scenario that the reaches were simulated with.
+        """Returns the scenario of the reaches.
 
         Raises:
             ScenarioError: This lic_drake does not know the scenario's category or parameters.
@@ -154,23 +150,21 @@ class ExperienceLibrary:
         scenario = parse_scenario(header.scenario, source=str(self.path))
         if scenario.digest != header.scenario_digest:
             raise LibraryError(
-                f"{self.path}: its scenario has digest {scenario.digest}, its reaches were made"
-                f" with {quoted(header.scenario_digest)}: the file was edited, or another lic_drake"
-                " wrote it; use that lic_drake, or collect the library again"
+                f"{self.path}: its scenario has digest {scenario.digest}, but its reaches have"
+                f" {quoted(header.scenario_digest)}: it was edited or written by another lic_drake;"
+                " use that lic_drake, or collect the library again"
             )
         return scenario
 
     def table(self) -> pa.Table:
         """Returns all rows, sorted by shard."""
         self.header()
-        tables = [read_table(path) for path in self.shard_paths()]
-        return pa.concat_tables([table.replace_schema_metadata() for table in tables])
+        return pa.concat_tables([table.replace_schema_metadata() for _, table in self._read(None)])
 
     def columns(self) -> dict[str, NDArray[Any]]:
         """Returns every column as an array of shape (n,), units as in `ReachRecord`.
 
-        Text columns are object arrays of str; `q_start` and `q_final` are object arrays of
-        arrays, because a reach that never began has no joint angles.
+        Text columns are object arrays of str; `q_start` and `q_final` are object arrays of arrays.
         """
         table = self.table()
         return {name: table.column(name).to_numpy() for name in table.column_names}
@@ -187,9 +181,9 @@ class ExperienceLibrary:
         """Writes a shard, replacing one of the same name as a whole, and returns its path.
 
         Args:
-            name: File name without suffix; without a leading dot or underscore.
+            name: File name without suffix, starting with a letter or digit.
             records: The rows.
-            scenario: The scenario of all records.
+            scenario: Their scenario.
 
         Raises:
             LibraryError: The folder cannot be written (permission, disk full), or a record
@@ -204,14 +198,12 @@ class ExperienceLibrary:
                 f"shard {name}: records of scenario {sorted(others)[0]} do not belong to"
                 f" scenario {header.scenario_digest}"
             )
-        table = to_table(records, header)
         self.create()
-        path = self.shard_path(name)
-        write_atomically(path, lambda temporary: write_table(table, temporary))
-        return path
+        _write_records(self.shard_path(name), records, header)
+        return self.shard_path(name)
 
     def compact(self) -> None:
-        """Writes all shards of a folder as one; a kill on the way loses nothing."""
+        """Merges all shards of a folder into one; loses nothing if killed."""
         paths = self.shard_paths()
         if len(paths) < 2 or self.path.is_file():
             return
@@ -219,7 +211,7 @@ class ExperienceLibrary:
         records = {record.key: record for record in self.records()}
         rows = sorted(records.values(), key=lambda r: (r.stream, r.environment, r.key))
         whole = self.shard_path(COMPACTED)
-        write_atomically(whole, lambda temporary: write_table(to_table(rows, header), temporary))
+        _write_records(whole, rows, header)
         with readable_errors(self.path, "delete the old shards of"):
             for path in paths:
                 if path != whole:
@@ -227,12 +219,12 @@ class ExperienceLibrary:
 
     @contextmanager
     def locked(self, share: Share = WHOLE) -> Iterator[None]:
-        """Lets nobody else add to the library within the block, but for other shares of the same.
+        """Locks the library against writers other than those of the other shares of a collection.
 
-        The lock ends with the process that holds it, however that dies.
+        The operating system releases the lock when the process ends, even if it is killed.
 
         Raises:
-            LibraryError: Somebody else is adding to it, or the folder cannot be written.
+            LibraryError: Another process is adding to it, or the folder cannot be written.
         """
         path = self.path / f"_collecting-{share.index}-of-{share.count}.lock"
         division = f"-of-{share.count}.lock"
@@ -250,27 +242,23 @@ class ExperienceLibrary:
                     " for it or stop it, or give each collection a --share of its own"
                 ) from None
         with lock:
-            lock.release()  # The context holds it a second time.
+            lock.release()  # The context manager has acquired it a second time.
             yield
 
     def create(self) -> None:
-        """Makes the folder if it is not there."""
+        """Creates the folder if it does not exist."""
         with readable_errors(self.path, "create the folder"):
             self.path.mkdir(parents=True, exist_ok=True)
 
 
 def merge_libraries(sources: Sequence[ExperienceLibrary], output: Path) -> int:
-    """Writes all rows of some libraries of one scenario into one file.
+    """Merges libraries of one scenario into a new file, and returns its number of rows.
 
-    A row that several libraries hold with the same values is written once. The rows are sorted by
-    environment and keep their order within it.
+    Identical rows are written once. Rows are sorted by environment, stably.
 
     Args:
         sources: One or more libraries.
-        output: A file that does not exist yet, with the suffix .parquet.
-
-    Returns:
-        The number of rows written.
+        output: A .parquet file that does not exist yet.
 
     Raises:
         LibraryError: The scenarios differ, two libraries hold different results of a reach, or a
@@ -299,10 +287,15 @@ def merge_libraries(sources: Sequence[ExperienceLibrary], output: Path) -> int:
     rows = sorted(merged.values(), key=lambda record: (record.stream, record.environment))
     with readable_errors(output.parent, "create the folder"):
         output.parent.mkdir(parents=True, exist_ok=True)
-    write_atomically(output, lambda temporary: write_table(to_table(rows, header), temporary))
+    _write_records(output, rows, header)
     return len(rows)
 
 
+def _write_records(path: Path, records: Sequence[ReachRecord], header: TableHeader) -> None:
+    table = to_table(records, header)
+    write_atomically(path, lambda temporary: write_table(table, temporary))
+
+
 def _content(record: ReachRecord) -> str:
-    """Returns everything but the wall time as text, in which NaN equals NaN."""
+    """Returns everything but the wall time, as text so that NaN equals NaN."""
     return repr(dataclasses.replace(record, wall_time_s=0.0))

@@ -1,6 +1,5 @@
 import csv
 import shutil
-import warnings
 from pathlib import Path
 
 import numpy as np
@@ -58,7 +57,7 @@ def test_rows_become_a_shard_with_their_source_and_weight(library: ExperienceLib
     assert check_library(library, read_request(library.path / REQUEST_FILE)).is_sound
 
 
-def test_csv_and_parquet_give_the_same_rows_bit_for_bit(
+def test_csv_and_parquet_give_bitwise_identical_rows(
     library: ExperienceLibrary, tmp_path: Path
 ) -> None:
     rng = np.random.default_rng(0)
@@ -71,7 +70,7 @@ def test_csv_and_parquet_give_the_same_rows_bit_for_bit(
     assert [record.goal_x for record in records] == [row["goal_x"] for row in rows]
 
 
-def test_sources_keep_their_environments_apart_and_their_failures_become_first_reaches(
+def test_environments_of_sources_are_distinct_and_their_failures_become_first_reaches(
     library: ExperienceLibrary,
 ) -> None:
     end = {f"final_{name}": 0.1 for name in ("x", "y", "phi", "vx", "vy")}
@@ -80,14 +79,12 @@ def test_sources_keep_their_environments_apart_and_their_failures_become_first_r
     add_rows(library, rows, source="arm-1", weight=3.0)
     add_rows(library, ROWS[:2], source="arm-2")
     pairs = pair_reaches(library.columns())
-    # Rows 1 and 3 failed, each is followed by all four; what arm-2 saw of its ends is nothing.
+    # Rows 1 and 3 failed, each is followed by all four; arm-2 has no final poses.
     assert len(pairs["success"]) == before + 2 * 4
     assert pairs["weight"][pairs["source"] == "arm-1"].tolist() == [3.0] * 8
 
 
-def test_the_same_rows_are_not_added_twice_whatever_they_are_called(
-    library: ExperienceLibrary,
-) -> None:
+def test_the_same_rows_are_not_added_twice(library: ExperienceLibrary) -> None:
     first = add_rows(library, ROWS, source="lab")
     with pytest.raises(LibraryError, match=r"4 rows of other were added before; .* delete"):
         add_rows(library, ROWS, source="other", weight=2.0)
@@ -96,7 +93,7 @@ def test_the_same_rows_are_not_added_twice_whatever_they_are_called(
 
 
 @pytest.mark.parametrize(
-    ("values", "said"),
+    ("values", "message"),
     [
         ({"source": "../lab"}, "cannot be the name of a source"),
         ({"source": "simulation"}, "cannot be the name of a source"),
@@ -106,49 +103,46 @@ def test_the_same_rows_are_not_added_twice_whatever_they_are_called(
         ({"rows": []}, "lab holds no rows"),
     ],
 )
-def test_what_is_refused_leaves_the_library_as_it_was(
-    values: dict[str, object], said: str, library: ExperienceLibrary
+def test_a_rejected_addition_leaves_the_library_unchanged(
+    values: dict[str, object], message: str, library: ExperienceLibrary
 ) -> None:
     arguments = {"rows": ROWS, "source": "lab", "weight": 1.0, **values}
-    with pytest.raises(LibraryError, match=said):
+    with pytest.raises(LibraryError, match=message):
         add_rows(library, arguments.pop("rows"), **arguments)
     assert len(library.shard_paths()) == 3
-
-
-def test_a_single_file_takes_no_rows(library: ExperienceLibrary) -> None:
-    with pytest.raises(LibraryError, match=r"single file; add to a folder"):
+    with pytest.raises(LibraryError, match="is a single file"):
         add_rows(ExperienceLibrary(library.shard_paths()[0]), ROWS, source="lab")
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "said"),
+    ("name", "content", "message"),
     [
-        ("rows.txt", "", ".csv or .parquet"),
-        ("rows.csv", "success,goal_x\n1,0.6,3\n", "more values than columns"),
-        ("rows.csv", "success;goal_x\n1;0,6\n", "by semicolons or tabs; save it with commas"),
-        ("rows.csv", b"\xff\xfe\x00", "cannot read"),
-        ("rows.parquet", "text", "cannot read"),
-        ("none.csv", None, "No such file"),
+        ("rows.txt", b"", ".csv or .parquet"),
+        ("rows.csv", b"success,goal_x\n1,0.6,3\n", "Expected 2 columns, got 3"),
+        ("rows.csv", b"success;goal_x\n1;0,6\n", "Expected 1 columns, got 2"),
+        ("rows.csv", b"success;goal_x\n1;0.6\n", "unknown column success;goal_x"),
+        ("rows.parquet", b"text", "cannot read .* as parquet"),
+        ("none.csv", None, "cannot read .*none.csv"),
     ],
 )
-def test_a_file_that_holds_no_rows_is_refused(
-    name: str, content: str | bytes | None, said: str, library: ExperienceLibrary, tmp_path: Path
+def test_a_file_without_valid_rows_is_rejected(
+    name: str, content: bytes | None, message: str, library: ExperienceLibrary, tmp_path: Path
 ) -> None:
     path = tmp_path / name
     if content is not None:
-        path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    with pytest.raises(LibraryError, match=said):
+        path.write_bytes(content)
+    with pytest.raises(LibraryError, match=message):
         add_file(library, path, source="lab")
 
 
-def test_what_was_not_given_has_its_default() -> None:
+def test_missing_values_have_defaults() -> None:
     first, second = check_rows([{**GOOD, "final_x": ""}, {**GOOD, "final_x": "0.5"}], PLANE, "lab")
     assert (first["success"], first["goal_x"], first["base_y"]) == (True, 0.6, 0.0)
     assert first["start_x"] == PLANE.task.start_line.x_m
     assert np.isnan(first["final_x"]) and second["final_x"] == 0.5
 
 
-def test_rows_without_environment_are_each_in_one_of_their_own() -> None:
+def test_each_row_without_an_environment_gets_its_own() -> None:
     rows = [{**GOOD, "environment": number} for number in [3, None, "", 3, 7]]
     environment = [row["environment"] for row in check_rows(rows, PLANE, "lab")]
     assert [environment[i] for i in (0, 3, 4)] == [3, 3, 7]
@@ -156,7 +150,7 @@ def test_rows_without_environment_are_each_in_one_of_their_own() -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
         ({"success": "yes"}, "row 2: success is yes; it must be true or false"),
         ({"success": ""}, "row 2: success is ; it must be true"),
@@ -165,42 +159,42 @@ def test_rows_without_environment_are_each_in_one_of_their_own() -> None:
         ({"goal_x": "1e300"}, "row 2: goal_x is 1e300"),
         ({"final_x": "inf"}, "row 2: final_x is inf"),
         ({"goal_x": 1.9}, r"row 2: the goal .* the arm reaches .* choose a nearer goal, or leave"),
-        ({"start_phi": 60}, "row 2: start_phi is 60 rad, .* in radians, not degrees"),
-        ({"start_y": 0.5}, r"row 2: start_y is 0.5 m .* from -0.42 to 0.42 m: .* leave the row"),
-        ({"environment": 1.5}, "row 2: environment is 1.5; give a whole number"),
-        ({"start_qx": 0.0}, "has a column start_qx that rows of cylinder-clutter do not have"),
+        ({"start_phi": 60}, "row 2: start_phi is 60, .* from -3.1416 to 3.1416 rad, not degrees"),
+        ({"start_y": 0.5}, r"row 2: start_y is 0.5, .* from -0.42 to 0.42 m .* leave the row"),
+        ({"environment": 1.5}, "row 2: environment is 1.5; it must be a whole number"),
+        ({"start_qx": 0.0}, "unknown column start_qx; rows of cylinder-clutter need success, goal"),
     ],
 )
-def test_what_cannot_be_is_refused_with_row_value_limit_and_what_to_do(
-    change: dict[str, object], said: str
+def test_invalid_rows_are_rejected_with_row_value_and_limit(
+    change: dict[str, object], message: str
 ) -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        with pytest.raises(LibraryError, match=said):
-            check_rows([GOOD, {**GOOD, **change}], PLANE, "lab")
+    with pytest.raises(LibraryError, match=message):
+        check_rows([GOOD, {**GOOD, **change}], PLANE, "lab")
 
 
-def test_a_needed_column_that_is_missing_is_named() -> None:
+def test_a_missing_column_is_named() -> None:
     rows = [{key: value for key, value in GOOD.items() if key != "start_phi"}]
-    with pytest.raises(LibraryError, match=r"lab has no column 'start_phi'; rows .* need success"):
+    with pytest.raises(LibraryError, match=r"lab lacks the column start_phi; rows .* need success"):
         check_rows(rows, PLANE, "lab")
 
 
-def test_a_moving_base_has_to_be_given_and_carries_the_start_line() -> None:
+def test_a_movable_base_is_required_and_shifts_the_start_line() -> None:
     scenario = load_scenario("cylinder-aperture-clutter")
-    with pytest.raises(LibraryError, match="no column 'base_y'"):
+    with pytest.raises(LibraryError, match="lacks the column base_y"):
         check_rows([GOOD], scenario, "lab")
     shifted = {**GOOD, "goal_y": 0.6, "start_y": 0.5, "base_y": 0.5}
     assert check_rows([shifted], scenario, "lab")[0]["base_y"] == 0.5
-    with pytest.raises(LibraryError, match=r"start_y is -0.5 m from the base"):
+    with pytest.raises(LibraryError, match=r"start_y is -0.5, .* m from the base"):
         check_rows([{**shifted, "start_y": 0.0}], scenario, "lab")
 
 
-def test_rows_in_space_have_a_torso_and_a_quaternion_of_length_1() -> None:
+def test_rows_of_the_pr2_need_torso_and_unit_quaternion() -> None:
     scenario = load_scenario("sphere-aperture-clutter")
     (row,) = check_rows([SPACE], scenario, "lab")
     assert [row[f"start_q{axis}"] for axis in "wxyz"] == [1.0, 0.0, 0.0, 0.0]
-    with pytest.raises(LibraryError, match=r"row 1: the quaternion .* divide it by its length"):
+    with pytest.raises(
+        LibraryError, match=r"row 1: the length of the quaternion .* from 0.999 to 1.001"
+    ):
         check_rows([{**SPACE, "start_qx": 0.5}], scenario, "lab")
-    with pytest.raises(LibraryError, match="no column 'torso'"):
+    with pytest.raises(LibraryError, match="lacks the column torso"):
         check_rows([{k: v for k, v in SPACE.items() if k != "torso"}], scenario, "lab")

@@ -2,12 +2,19 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
+from scipy.stats import binomtest
 from support.fake_reach import make_record, make_request
 
-from lic_drake.errors import LibraryError
 from lic_drake.experience.add import add_rows
-from lic_drake.experience.check import Difference, check_library, recompute
+from lic_drake.experience.check import (
+    Difference,
+    SourceSummary,
+    check_library,
+    recompute,
+    summarize,
+)
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 from lic_drake.reach.request import ReachRecord, ReachRequest
@@ -25,27 +32,20 @@ def library(tmp_path: Path) -> ExperienceLibrary:
     return library
 
 
-def test_a_complete_library_is_sound(library: ExperienceLibrary) -> None:
+def test_only_a_complete_library_is_sound(library: ExperienceLibrary) -> None:
     report = check_library(library, REQUEST)
     assert (report.shards, report.reaches, report.requested, report.missing) == (3, 36, 36, 0)
-    assert report.incomplete == ()
-    assert report.scenarios == (REQUEST.scenario.digest,)
+    assert (report.incomplete, report.scenarios) == ((), (REQUEST.scenario.digest,))
     assert report.is_sound
-
-
-def test_without_a_request_completeness_stays_open(library: ExperienceLibrary) -> None:
+    library.shard_path("shard-1").unlink()
+    report = check_library(library, REQUEST)
+    assert (report.missing, report.incomplete, report.is_sound) == (12, (1,), False)
     report = check_library(library)
     assert (report.requested, report.missing, report.incomplete) == (None, None, ())
     assert report.is_sound
 
 
-def test_missing_reaches_are_counted(library: ExperienceLibrary) -> None:
-    library.shard_path("shard-1").unlink()
-    report = check_library(library, REQUEST)
-    assert (report.missing, report.incomplete, report.is_sound) == (12, (1,), False)
-
-
-def test_damaged_files_are_named_and_the_others_counted(library: ExperienceLibrary) -> None:
+def test_damaged_files_are_reported_and_the_others_counted(library: ExperienceLibrary) -> None:
     shard = library.shard_path("shard-1")
     shard.write_bytes(shard.read_bytes()[:1000])
     (library.path / "empty.parquet").touch()
@@ -56,14 +56,14 @@ def test_damaged_files_are_named_and_the_others_counted(library: ExperienceLibra
     assert (report.reaches, report.missing, report.is_sound) == (24, 12, False)
 
 
-def test_reaches_that_are_there_twice_are_named(library: ExperienceLibrary) -> None:
+def test_duplicates_are_reported(library: ExperienceLibrary) -> None:
     library.write_shard("twice", RECORDS[1][2:4], REQUEST.scenario)
     report = check_library(library)
     assert set(report.duplicates) == {record.key for record in RECORDS[1][2:4]}
     assert not report.is_sound
 
 
-def test_mixed_scenarios_are_named(library: ExperienceLibrary) -> None:
+def test_mixed_scenarios_are_reported(library: ExperienceLibrary) -> None:
     other = load_scenario("cylinder-clutter", "{stop: {timeout_s: 20}}")
     library.write_shard(
         "other",
@@ -78,36 +78,25 @@ def test_mixed_scenarios_are_named(library: ExperienceLibrary) -> None:
     assert not report.is_sound
 
 
-def test_a_library_that_is_not_there_is_an_error(tmp_path: Path) -> None:
-    with pytest.raises(LibraryError, match="no experience library at"):
-        check_library(ExperienceLibrary(tmp_path / "none"))
-
-
 def rng() -> np.random.Generator:
     return np.random.default_rng(3)
 
 
-def test_every_simulated_row_is_drawn_once_and_the_same(library: ExperienceLibrary) -> None:
+def test_every_simulated_row_is_drawn_once_and_reproduced(library: ExperienceLibrary) -> None:
     row = {"goal_x": 0.6, "goal_y": 0.1, "start_y": 0.0, "start_phi": 1.0, "success": 1}
     simulated = library.successes().keys()
     add_rows(library, [row], source="lab")
     asked: list[str] = []
-    done: list[tuple[int, int]] = []
 
     def reach(request: ReachRequest) -> ReachRecord:
         asked.append(request.key)
         return make_record(request)
 
-    def show(rows: int, total: int) -> None:
-        done.append((rows, total))
-
-    found = recompute(library, 100, rng(), reach=reach, progress=show)
-    assert found == []
+    assert recompute(library, 100, rng(), reach=reach) == []
     assert sorted(asked) == sorted(simulated)
-    assert done == [(i, 36) for i in range(1, 37)]
 
 
-def test_a_difference_in_the_last_bit_is_told(library: ExperienceLibrary) -> None:
+def test_a_difference_in_the_last_bit_is_reported(library: ExperienceLibrary) -> None:
     row = next(r for r in library.records() if r.outcome == "stuck")
 
     def reach(request: ReachRequest) -> ReachRecord:
@@ -122,8 +111,26 @@ def test_a_difference_in_the_last_bit_is_told(library: ExperienceLibrary) -> Non
     assert found == [expected]
 
 
-def test_rows_of_the_shipped_library_end_as_they_did() -> None:
+def test_rows_of_the_shipped_library_are_reproduced() -> None:
     # Not bit for bit: that holds on the processor that collected it.
     library = ExperienceLibrary(shipped_library("cylinder-clutter"))
     differing = recompute(library, 25, rng())
     assert sum(row.outcomes[0] != row.outcomes[1] for row in differing) <= 1
+
+
+def test_a_summary_agrees_with_pandas(library: ExperienceLibrary) -> None:
+    row = {"goal_x": 0.6, "goal_y": 0.1, "start_y": 0.0, "start_phi": 1.0, "success": 1}
+    frame = pd.read_parquet(library.path)
+    add_rows(library, [row] * 3, source="lab", weight=4.0)
+    summary = summarize(library)
+    assert (summary.reaches, summary.shards, summary.streams) == (36, 4, ("training",))
+    assert (summary.environments, summary.goals, summary.starts) == (3, 4, 3)
+    assert summary.outcomes == frame["outcome"].value_counts().to_dict()
+    assert list(summary.outcomes.values()) == sorted(summary.outcomes.values(), reverse=True)
+    assert summary.successes == frame["success"].sum()
+    assert summary.success_rate == frame["success"].mean()
+    interval = binomtest(summary.successes, 36).proportion_ci(0.9, method="wilson")
+    np.testing.assert_allclose(summary.success_interval, (interval.low, interval.high))
+    np.testing.assert_allclose(summary.simulated_s, frame["duration_s"].sum())
+    assert summary.scenario == REQUEST.scenario.digest
+    assert summary.added == (SourceSummary(source="lab", reaches=3, successes=3, weights=(4.0,)),)
