@@ -44,10 +44,10 @@ class CameraImage:
         return np.stack([u, v, np.ones_like(u)], axis=-1)
 
     def project(self, p_WQ: Vector) -> Vector:
-        """Returns where points appear, (column, row), shape (n, 2), pixels.
+        """Returns where points in front of the camera appear: (column, row), shape (.., 2), pixels.
 
         Args:
-            p_WQ: Points in front of the camera, shape (n, 3), metres.
+            p_WQ: The points, shape (.., 3), metres.
         """
         return self.project_from_camera((p_WQ - self.p_WC) @ self.R_WC)
 

@@ -1,39 +1,44 @@
-"""The estimated probability of success through each aperture of a board (paper Fig. 2)."""
+"""Maps of the estimated probability of success through each aperture (paper Fig. 2)."""
 
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Rectangle
+from matplotlib.patches import Circle, Polygon
+from matplotlib.patheffects import withStroke
 
 from lic_drake.evaluate.trial import Attempt
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.objective import SuccessObjective
-from lic_drake.show.figures import estimate_title, situations
+from lic_drake.show.figures import attempts_figure, estimate_title, situation_before
 from lic_drake.starts import BoardStarts
 from lic_drake.types import Vector
+
+CORNERS = 0.5 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+"""Corners of a square of edge 1 around its centre."""
 
 
 def apertures_figure(
     selector: LicSelector, starts: BoardStarts, attempts: Sequence[Attempt]
 ) -> Figure:
-    """Returns a map before each attempt.
+    """Returns a map of a known board before each attempt.
 
     Args:
         selector: Whose estimates to draw; the attempts may be another strategy's.
         starts: The feasible starts.
         attempts: The attempts, all but the last one failures.
     """
-    figure = Figure(figsize=(6.5 * len(attempts), 4.5))
-    axes = figure.subplots(1, len(attempts), squeeze=False)[0]
-    before = situations(attempts, [starts] * len(attempts))
-    for ax, (number, attempt, situation) in zip(axes, before, strict=True):
+
+    def draw(ax: Axes, number: int) -> None:
+        attempt, situation = attempts[number - 1], situation_before(attempts, number, starts)
         values = estimate_apertures(selector.objective(situation), starts)
-        chosen = attempt.request.start.x0[:3]
-        draw_aperture_map(ax, starts, values, situation.p_WG, [(f"attempt {number}", chosen)])
+        chosen = nearest_aperture(starts, attempt)
+        draw_aperture_map(ax, starts, values, situation.p_WG, chosen)
         ax.set_title(estimate_title(selector, number, attempt), fontsize=10)
-    return figure
+
+    return attempts_figure(len(attempts), 6.0, draw)
 
 
 def estimate_apertures(objective: SuccessObjective, starts: BoardStarts) -> Vector:
@@ -54,49 +59,62 @@ def estimate_apertures(objective: SuccessObjective, starts: BoardStarts) -> Vect
     return best
 
 
+def nearest_aperture(starts: BoardStarts, attempt: Attempt) -> int:
+    """Returns the index in `starts.p_WA` of the aperture that an attempt went through."""
+    return int(np.argmin(np.linalg.norm(starts.p_WA - attempt.request.start.x0[:3], axis=1)))
+
+
 def draw_aperture_map(
     ax: Axes,
     starts: BoardStarts,
     probability: Vector,
     p_WG: Vector,
-    chosen: Sequence[tuple[str, Vector]] = (),
+    chosen: int | None = None,
 ) -> Axes:
-    """Draws the board as the robot sees it: its left is on the left.
+    """Draws the board's open apertures as the robot sees them: its left is on the left.
 
     Args:
         ax: Where to draw.
-        starts: Gives the apertures, open and blocked.
+        starts: Gives the board and its open apertures.
         probability: Estimates for the open ones, shape (k,).
         p_WG: Goal, shape (3,), metres.
-        chosen: Labels and centres of apertures that were chosen.
+        chosen: Index of an open aperture that gets a frame.
     """
-    image, edge = None, starts.board.aperture_m
-    half = 0.5 * edge
-    highest = max(0.01, float(np.nanmax(probability, initial=0.0)))
-    for p in starts.board.aperture_centres():
-        y, z = p[1:]
-        is_here = np.all(np.isclose(starts.p_WA, p), axis=1)
-        if not np.any(is_here):
-            corner = (y - half, z - half)
-            ax.add_patch(Rectangle(corner, edge, edge, fc="0.75", ec="0.4", hatch="xx"))
-            continue
-        value = probability[is_here][0]
-        sides = [y - half, y + half], [z - half, z + half]
-        image = ax.pcolormesh(
-            *sides, [[value]], vmin=0.0, vmax=highest, cmap="RdYlGn", edgecolors="0.4"
-        )
-        # The number makes room for the goal.
-        near = np.max(np.abs(p_WG[1:] - p[1:])) < half
-        aside = (0.55 * half if p_WG[2] < z else -0.35 * half) if near else 0.0
-        text = "-" if np.isnan(value) else f"{100 * value:.0f} %"
-        ax.text(y, z + aside, text, ha="center", va="center", fontsize=9)
-    for label, (_, y, z) in chosen:
-        corner, inner = (y - half + 0.008, z - half + 0.008), edge - 0.016
-        ax.add_patch(Rectangle(corner, inner, inner, fill=False, ec="tab:blue", lw=2.5))
-        ax.text(y, z - 0.7 * half, label, ha="center", fontsize=7, color="tab:blue")
-    ax.add_patch(Circle((p_WG[1], p_WG[2]), 0.02, fc="tab:cyan", ec="k", zorder=5))
-    if image is not None and ax.figure is not None:
-        ax.figure.colorbar(image, ax=ax, label="estimated probability of success")
-    ax.set(xlabel="y [m]", ylabel="z [m]", aspect="equal")
-    ax.invert_xaxis()
+    edge = starts.board.aperture_m
+    outlines = starts.p_WA[:, np.newaxis, 1:] + edge * CORNERS
+    draw_probabilities(ax, outlines, probability, chosen)
+    ax.add_patch(Circle((p_WG[1], p_WG[2]), 0.02, fc="tab:cyan", ec="k"))
+    centres = starts.board.aperture_centres()[:, 1:]
+    low, high = centres.min(axis=0) - edge, centres.max(axis=0) + edge
+    ax.set(xlim=(high[0], low[0]), ylim=(low[1], high[1]), aspect="equal", facecolor="burlywood")
+    ax.set(xlabel="y [m]", ylabel="z [m]")
     return ax
+
+
+def draw_probabilities(
+    ax: Axes, outlines: Vector, probability: Vector, chosen: int | None = None
+) -> None:
+    """Fills apertures: the brighter, the more likely a reach through them succeeds.
+
+    Args:
+        ax: Where to draw.
+        outlines: Their corners in the axes' coordinates, shape (n, 4, 2).
+        probability: Estimated probability of success, shape (n,); NaN, drawn as 0 without a
+            number, where the arm cannot reach through.
+        chosen: Index of an aperture that gets a frame.
+    """
+    for outline, value in zip(outlines, probability, strict=True):
+        shade = colormaps["gray"](np.nan_to_num(value))
+        ax.add_patch(Polygon(outline, closed=True, facecolor=shade, edgecolor="0.3", alpha=0.9))
+        if not np.isnan(value):
+            write(ax, outline.mean(axis=0), f"{value:.2f}", "black" if value > 0.5 else "white")
+    if chosen is not None:
+        ax.add_patch(Polygon(outlines[chosen], closed=True, fill=False, ec="tab:cyan", lw=2.5))
+
+
+def write(ax: Axes, at: Vector, text: str, color: str) -> None:
+    """Writes centred, outlined text at a point of the axes, shape (2,)."""
+    around = withStroke(linewidth=2.0, foreground="black" if color == "white" else "white")
+    x, y = at
+    middle = {"ha": "center", "va": "center"}
+    ax.text(x, y, text, middle, color=color, fontsize=7, weight="bold", path_effects=[around])

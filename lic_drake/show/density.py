@@ -10,7 +10,12 @@ from lic_drake.evaluate.trial import Attempt
 from lic_drake.reach.start import Start, Starts
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.situation import Situation
-from lic_drake.show.figures import ATTEMPT_COLORS, estimate_title, situations
+from lic_drake.show.figures import (
+    ATTEMPT_COLORS,
+    attempts_figure,
+    estimate_title,
+    situation_before,
+)
 from lic_drake.starts import LineStarts, Region, find_regions
 from lic_drake.types import Vector
 
@@ -28,17 +33,16 @@ def densities_figure(
         starts: The feasible starts.
         attempts: The attempts, all but the last one failures.
     """
-    figure = Figure(figsize=(7.0 * len(attempts), 4.5))
-    axes = figure.subplots(1, len(attempts), squeeze=False)[0]
-    before = situations(attempts, [starts] * len(attempts))
-    for ax, (number, attempt, situation) in zip(axes, before, strict=True):
+
+    def draw(ax: Axes, number: int) -> None:
+        attempt, situation = attempts[number - 1], situation_before(attempts, number, starts)
         chosen = attempt.request.start
-        # Selections lie in one.
         region = starts.regions[find_regions(starts.regions, Starts.of(chosen))[0]]
         lattice = density_lattice(starts, region)
         draw_density(ax, lattice, estimate_density(selector, situation, lattice), chosen, number)
         ax.set_title(estimate_title(selector, number, attempt), fontsize=10)
-    return figure
+
+    return attempts_figure(len(attempts), 7.0, draw)
 
 
 def density_lattice(starts: LineStarts, region: Region) -> Starts:
@@ -86,17 +90,9 @@ def draw_density(
     y, phi = (lattice.in_R[:, k].reshape(DENSITY_SHAPE) for k in (1, 2))
     values = probability.reshape(DENSITY_SHAPE)
     image = ax.pcolormesh(y, phi, values, cmap="jet", vmin=0.0, vmax=1.0, shading="nearest")
-    ax.plot(
-        *chosen.x0_R[1:],
-        marker="*",
-        markersize=16,
-        color=ATTEMPT_COLORS[(number - 1) % len(ATTEMPT_COLORS)],
-        markeredgecolor="white",
-        linestyle="none",
-        clip_on=False,
-        zorder=5,
-        label=f"attempt {number}",
-    )
+    color = ATTEMPT_COLORS[(number - 1) % len(ATTEMPT_COLORS)]
+    (star,) = ax.plot(*chosen.x0_R[1:], "*", ms=16, color=color, label=f"attempt {number}")
+    star.set(markeredgecolor="white", clip_on=False)
     ax.set(xlabel="start position y [m]", ylabel="start orientation φ [rad]", facecolor="0.9")
     ax.legend(loc="lower right", fontsize=8)
     if ax.figure is not None:

@@ -1,10 +1,11 @@
 """What all figures share: files, colours, labels."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from lic_drake.clutter.instance import ClutterInstance
@@ -67,19 +68,24 @@ class ShownTrial:
         return iter(zip(self.attempts, self.traces, strict=True))
 
 
-def situations(
-    attempts: Sequence[Attempt], starts: Sequence[FeasibleStarts]
-) -> Iterator[tuple[int, Attempt, Situation]]:
-    """Yields each attempt with its number, from 1, and the situation in which it was selected.
+def attempts_figure(num_attempts: int, width: float, draw: Callable[[Axes, int], None]) -> Figure:
+    """Returns a figure with a panel for each attempt.
 
     Args:
-        attempts: The attempts, all but the last one failures.
-        starts: The feasible starts before each of them.
+        num_attempts: Number of attempts.
+        width: Width of a panel, inches.
+        draw: Draws the panel of an attempt, from 1.
     """
-    for i, attempt in enumerate(attempts):
-        failed = tuple(FailedReach.from_record(earlier.record) for earlier in attempts[:i])
-        situation = Situation(p_WG=attempt.request.goal, starts=starts[i], failed=failed)
-        yield i + 1, attempt, situation
+    figure = Figure(figsize=(width * num_attempts, 4.8), layout="constrained")
+    for i, ax in enumerate(figure.subplots(1, num_attempts, squeeze=False)[0]):
+        draw(ax, i + 1)
+    return figure
+
+
+def situation_before(attempts: Sequence[Attempt], number: int, starts: FeasibleStarts) -> Situation:
+    """Returns the situation in which an attempt, from 1, was selected from feasible starts."""
+    failed = tuple(FailedReach.from_record(attempt.record) for attempt in attempts[: number - 1])
+    return Situation(p_WG=attempts[number - 1].request.goal, starts=starts, failed=failed)
 
 
 def estimate_title(selector: LicSelector, number: int, attempt: Attempt) -> str:

@@ -1,7 +1,6 @@
 """What both cameras see while the robot reaches, as an animated picture."""
 
-from collections.abc import Iterable
-from dataclasses import replace
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -9,82 +8,56 @@ from numpy.typing import NDArray
 from PIL import Image
 from pydrake.systems.framework import DiagramBuilder
 
-from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import LicError
 from lic_drake.perception.cameras import add_cameras, take_color_image
-from lic_drake.perception.config import CameraConfig, CamerasConfig
-from lic_drake.reach.trace import SceneState
+from lic_drake.perception.config import CamerasConfig
+from lic_drake.show.figures import ShownTrial
 from lic_drake.show.stage import place
-from lic_drake.types import Vector
+
+FRAMES_PER_SECOND = 2.0
+"""Frames per simulated second."""
+
+SPEED = 2.0
+"""Playback speed relative to the reach."""
 
 SHRINK = 2
-"""Factor by which a film's images are smaller than the cameras'."""
+"""Factor by which frames are smaller than the cameras' images."""
 
 
-class FilmCamera:
-    """Films states of an environment with both cameras; the head camera moves with the robot."""
+def film_frames(trial: ShownTrial, cameras: CamerasConfig) -> Iterator[NDArray[np.uint8]]:
+    """Yields the views of head and external camera side by side, shape (height, width, 3).
 
-    def __init__(self, instance: ClutterInstance, p_WG: Vector, cameras: CamerasConfig) -> None:
-        """Builds the scene.
+    The head camera moves with the robot.
 
-        Args:
-            instance: The environment.
-            p_WG: Position of the ball, shape (3,), metres.
-            cameras: The cameras.
-
-        Raises:
-            RenderingError: Cameras cannot be simulated on this machine.
-        """
-        builder = DiagramBuilder()
-        head = replace(cameras.head, camera=_shrunk(cameras.head.camera))
-        external = replace(cameras.external, camera=_shrunk(cameras.external.camera))
-        small = replace(cameras, head=head, external=external)
-        self._rig = add_cameras(builder, instance, p_WG, small, ahead=True)
-        self._diagram = builder.Build()
-        self._context = self._diagram.CreateDefaultContext()
-
-    def frame(self, b0: Vector, state: SceneState) -> NDArray[np.uint8]:
-        """Returns the head's view and the external one side by side, shape (height, width, 3).
-
-        Args:
-            b0: Base position and torso height, shape (3,), metres.
-            state: Where arm and clutter are.
-        """
-        place(self._rig.scene, self._context, b0, state.q, state)
-        sensors = (self._rig.head, self._rig.external)
-        return np.hstack([take_color_image(sensor, self._context) for sensor in sensors])
+    Raises:
+        RenderingError: Cameras cannot be simulated on this machine.
+    """
+    builder = DiagramBuilder()
+    rig = add_cameras(builder, trial.instance, trial.p_WG, cameras, ahead=True)
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    step = max(1, round(trial.scenario.mpc.rate_hz / FRAMES_PER_SECOND))
+    for trace in trial.traces:
+        for state in trace.states[::step]:
+            place(rig.scene, context, trace.p_WR, state.q, state)
+            views = [take_color_image(sensor, context) for sensor in (rig.head, rig.external)]
+            yield np.hstack(views)[::SHRINK, ::SHRINK]
 
 
-def save_film(frames: Iterable[NDArray[np.uint8]], frames_per_second: float, path: Path) -> None:
+def save_film(frames: Iterable[NDArray[np.uint8]], path: Path) -> None:
     """Writes an animated WebP picture, which browsers play in a loop.
 
     Args:
         frames: At least one, each of shape (height, width, 3).
-        frames_per_second: Playback speed.
         path: The file.
 
     Raises:
         LicError: It cannot be written.
     """
     first, *others = [Image.fromarray(frame) for frame in frames]
+    duration = round(1000.0 / (SPEED * FRAMES_PER_SECOND))
+    options = {"save_all": True, "append_images": others, "duration": duration, "loop": 0}
     try:
-        first.save(
-            path,
-            format="WEBP",
-            save_all=True,
-            append_images=others,
-            duration=round(1000.0 / frames_per_second),
-            loop=0,
-            quality=70,
-        )
+        first.save(path, format="WEBP", quality=70, **options)
     except OSError as error:
         raise LicError(f"cannot write {path}: {error.strerror or error}") from None
-
-
-def _shrunk(camera: CameraConfig) -> CameraConfig:
-    return replace(
-        camera,
-        width=max(16, camera.width // SHRINK),
-        height=max(16, camera.height // SHRINK),
-        focal_px=camera.focal_px / SHRINK,
-    )

@@ -1,11 +1,9 @@
 """What a demonstration shows of its attempts: a recording, figures, stills, a film and a page."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from lic_drake.evaluate.trial import Attempt
 from lic_drake.perception.observer import Observer
@@ -16,19 +14,13 @@ from lic_drake.show.approach import Approach
 from lic_drake.show.density import densities_figure
 from lic_drake.show.detections import look_figure, maps_figure
 from lic_drake.show.figures import ShownTrial, save_figure
-from lic_drake.show.film import FilmCamera, save_film
+from lic_drake.show.film import film_frames, save_film
 from lic_drake.show.page import embed, make_page, picture
 from lic_drake.show.recording import Recording
 from lic_drake.show.stage import in_plane
 from lic_drake.show.stills import save_stills
 from lic_drake.show.views import SIDE, TOP, draw_view
 from lic_drake.starts import BoardStarts, LineStarts
-
-FRAMES_PER_SECOND = 2.0
-"""Frames of the film per simulated second."""
-
-FILM_SPEED = 2.0
-"""Playback speed of the film, relative to the reach."""
 
 _OLD = (
     *("density.png", "apertures.png", "look[1-9].png", "views.webp", "sequence.html"),
@@ -86,7 +78,7 @@ def save_pictures(
             save(f"look {number}", f"look{number}.png", figure)
         if any(trace.states for trace in trial.traces):
             files["views"] = out / "views.webp"
-            save_film(_film(trial, known), FILM_SPEED * FRAMES_PER_SECOND, files["views"])
+            save_film(film_frames(trial, known.cameras), files["views"])
         files["sequence"] = out / "sequence.html"
         page = _sequence_page(known, attempts, files, recording)
         files["sequence"].write_text(page, encoding="utf-8")
@@ -111,14 +103,6 @@ def record_trial(trial: ShownTrial, drake_models: Path | None = None) -> Recordi
             before = trace
         recording.add_reach(trace, trial.p_WG)
     return recording
-
-
-def _film(trial: ShownTrial, observer: Observer) -> Iterator[NDArray[np.uint8]]:
-    camera = FilmCamera(trial.instance, trial.p_WG, observer.cameras)
-    step = max(1, round(trial.scenario.mpc.rate_hz / FRAMES_PER_SECOND))
-    for trace in trial.traces:
-        for state in trace.states[::step]:
-            yield camera.frame(trace.p_WR, state)
 
 
 def _path_figure(trial: ShownTrial) -> Figure:

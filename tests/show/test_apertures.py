@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
-from matplotlib.patches import Ellipse, Polygon, Rectangle
+from matplotlib.patches import Ellipse, Polygon
 from support.ray_casting import blank, tilted
 
 from lic_drake.perception.apertures import DetectedApertures
@@ -11,12 +11,7 @@ from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.start import Starts
 from lic_drake.select.objective import Objective
 from lic_drake.show.apertures import draw_aperture_map, estimate_apertures
-from lic_drake.show.detections import (
-    STATE_COLORS,
-    draw_apertures,
-    draw_goal,
-    draw_passable_probability,
-)
+from lic_drake.show.detections import STATE_COLORS, draw_apertures, draw_goal
 from lic_drake.starts import board_starts
 
 BLOCKED = load_scenario("sphere-aperture-clutter", "{clutter: {num_blocked: 6}}")
@@ -51,17 +46,18 @@ def test_the_estimate_of_an_aperture_is_the_best_from_there_as_a_probability() -
     assert np.all(np.isnan(best[~reachable]))
 
 
-def test_open_apertures_show_numbers_and_blocked_ones_are_hatched() -> None:
+def test_open_apertures_are_the_brighter_the_more_passable_and_the_chosen_one_is_framed() -> None:
     ax = Figure().subplots()
     probability = np.linspace(0.1, 0.8, len(STARTS.p_WA))
-    chosen = [("attempt 1", STARTS.p_WA[3])]
-    draw_aperture_map(ax, STARTS, probability, np.array([0.84, -0.1, 0.8]), chosen)
-    texts = [text.get_text() for text in ax.texts]
-    assert sum(text.endswith("%") for text in texts) == 14
-    assert f"{100 * probability[3]:.0f} %" in texts
-    assert "attempt 1" in texts
-    hatched = [p for p in ax.patches if isinstance(p, Rectangle) and p.get_hatch()]
-    assert len(hatched) == 6
+    probability[0] = np.nan
+    draw_aperture_map(ax, STARTS, probability, np.array([0.84, -0.1, 0.8]), 3)
+    *apertures, frame = [patch for patch in ax.patches if isinstance(patch, Polygon)]
+    shades = [patch.get_facecolor()[0] for patch in apertures]
+    np.testing.assert_allclose(shades, np.nan_to_num(probability), atol=0.01)
+    centres = [patch.get_xy()[:4].mean(axis=0) for patch in apertures]
+    np.testing.assert_allclose(centres, STARTS.p_WA[:, 1:])
+    np.testing.assert_allclose(frame.get_xy(), apertures[3].get_xy())
+    assert [text.get_text() for text in ax.texts] == [f"{value:.2f}" for value in probability[1:]]
     assert ax.xaxis_inverted()  # The robot's left is on the left.
 
 
@@ -72,16 +68,6 @@ def test_detected_apertures_are_outlined_in_the_colour_of_their_state() -> None:
         np.testing.assert_allclose(patch.get_xy()[:4], IMAGE.project(corners))
         assert patch.get_edgecolor() == to_rgba(STATE_COLORS[state])
     assert [text.get_text() for text in ax.texts] == ["1.00", "0.25", "0.00"]
-
-
-def test_the_brighter_an_aperture_the_more_passable_it_is() -> None:
-    probability = np.array([0.9, 0.2, np.nan])
-    ax = draw_passable_probability(Figure().subplots(), IMAGE, FOUND, probability)
-    shades = [p.get_facecolor()[0] for p in ax.patches if isinstance(p, Polygon)]
-    np.testing.assert_allclose(shades, [0.9, 0.2, 0.0], atol=0.01)
-    assert [text.get_text() for text in ax.texts] == ["0.90", "0.20"]
-    with pytest.raises(ValueError, match=r"probability has shape \(2,\), not \(3,\)"):
-        draw_passable_probability(Figure().subplots(), IMAGE, FOUND, np.ones(2))
 
 
 def test_a_detected_goal_is_drawn_as_the_ball_and_two_standard_deviations() -> None:
