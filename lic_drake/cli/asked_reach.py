@@ -58,31 +58,28 @@ def _goal(scenario: Scenario, in_space: bool, args: argparse.Namespace) -> Vecto
 def _through_an_aperture(
     scenario: Scenario, instance: ClutterInstance, p_WG: Vector, args: argparse.Namespace
 ) -> ReachRequest:
-    starts = board_starts(scenario, instance, scenario.task.stand)
+    starts = board_starts(scenario, instance, moves=True)
     y_m = 0.0 if args.base_y is None else args.base_y
-    torso_m = scenario.task.torso_m if args.torso is None else args.torso
-    _check_stand(starts, y_m, torso_m)
+    torso = starts.home[2] if args.torso is None else args.torso
+    b0 = np.array([0.0, y_m, torso])
+    _check_base(starts, b0)
     if args.aperture is None:
         p_WA = starts.p_WA[np.argmin(np.linalg.norm(starts.p_WA[:, 1:] - p_WG[1:], axis=1))]
     else:
         p_WA = starts.nearest_aperture(*args.aperture)
-    b0 = np.array([0.0, y_m, torso_m])
     check_goal(scenario, p_WG - b0)
-    found = starts.at(p_WA, b0)
+    found = starts.nearest(p_WA, b0)
     if found is None:
         raise RequestError(
-            f"from base y {y_m:g} m, torso {torso_m:g} m the arm cannot be in the aperture at y"
+            f"from base y {y_m:g} m, torso {torso:g} m the arm cannot be in the aperture at y"
             f" {p_WA[1]:.3f} m, z {p_WA[2]:.3f} m; choose another --base-y, --torso or --aperture"
         )
     start = Start(found.x0, b0)
     return ReachRequest(scenario, args.stream, args.environment, p_WG, start)
 
 
-def _check_stand(starts: BoardStarts, y_m: float, torso_m: float) -> None:
-    stand = starts.stand
-    for option, value, low, high in (
-        ("--base-y", y_m, stand.y_min_m, stand.y_max_m),
-        ("--torso", torso_m, stand.torso_min_m, stand.torso_max_m),
-    ):
+def _check_base(starts: BoardStarts, b0: Vector) -> None:
+    for axis, option in ((1, "--base-y"), (2, "--torso")):
+        value, low, high = b0[axis], starts.b0_lower[axis], starts.b0_upper[axis]
         if not low <= value <= high:
             raise RequestError(f"{option} must be from {low:g} to {high:g} m, got {value:g}")

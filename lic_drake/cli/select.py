@@ -208,7 +208,7 @@ def _failed_reach(starts: "FeasibleStarts", shown: dict[str, float]) -> "FailedR
         b0[axis] = shown.get(name, b0[axis])
     if isinstance(starts, BoardStarts):
         p_WA = starts.nearest_aperture(shown["start_y"], shown["start_z"])
-        start = starts.at(p_WA, b0) or Start(np.append(p_WA, [1.0, 0.0, 0.0, 0.0]), b0)
+        start = starts.nearest(p_WA, b0) or Start(np.append(p_WA, [1.0, 0.0, 0.0, 0.0]), b0)
     else:
         x_m = shown.get("start_x", float(starts.grid.x0[0, 0]))
         start = Start(np.array([x_m, shown["start_y"], shown["start_phi"]]), b0)

@@ -137,9 +137,8 @@ def estimate_board(scenario: Scenario, look: Look, moves: bool = True) -> Belief
         raise PerceptionError(f"the board was seen at an impossible place: {error}") from None
     # `board_of` has checked that the scenario's clutter is a board.
     believed = replace(scenario, clutter=seen)  # type: ignore[arg-type]
-    stand = believed.task.stand if moves else None
     covered = np.delete(np.arange(len(found.p_WA)), index)
-    starts = board_starts(believed, seen.blocked_board(covered), stand)
+    starts = board_starts(believed, seen.blocked_board(covered), moves)
     return Belief(
         look=look,
         p_WG=look.goal.p_WG,

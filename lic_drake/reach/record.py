@@ -24,6 +24,8 @@ def make_record(request: ReachRequest, result: ReachResult, wall_time_s: float) 
         final = np.full(len(x0), np.nan)
     else:
         final = scenario.arm().tip_pose(trace.q[-1])
+    # Kept where the reach never began, too: with the key they lead back to the request.
+    prescribed = np.zeros(0) if request.start.q is None else request.start.q
     axes = 3 if len(x0) == IN_SPACE else 2
     final[:axes] += b0[:axes]
     still_s = scenario.stop.stuck_time_s if outcome == "stuck" else 0.0
@@ -48,7 +50,7 @@ def make_record(request: ReachRequest, result: ReachResult, wall_time_s: float) 
         mean_contacts=math.nan if nothing else float(np.mean(trace.contacts)),
         duration_s=0.0 if nothing else trace.time_s[-1],
         wall_time_s=wall_time_s,
-        q_start=() if nothing else tuple(trace.q[0].tolist()),
+        q_start=tuple((trace.q[0] if trace.q else prescribed).tolist()),
         q_final=() if nothing else tuple(trace.q[-1].tolist()),
         detail=detail,
         lic_drake_version=lic_drake.__version__,

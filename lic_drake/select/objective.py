@@ -35,12 +35,7 @@ class SuccessObjective(Protocol):
         ...
 
     def value_and_gradient(self, x0: Vector, b0: Vector) -> tuple[float, Vector, Vector]:
-        """Returns the estimate and its gradients by x0 and by b0, shape (3,).
-
-        Args:
-            x0: Hand pose in W, shape (3,), or (7,) in space.
-            b0: Place of the base and height of the torso, shape (3,), metres.
-        """
+        """Returns the estimate and its gradients by x0 and by b0, shape (3,)."""
         ...
 
 

@@ -86,6 +86,8 @@ class LicProgram(MathematicalProgram):
         self._base = self.AddBoundingBoxConstraint(zeros, zeros, self.b0).evaluator()
         self._place = PositionConstraint(plant, world, zeros, zeros, hand, zeros, context)
         self.AddConstraint(self._place, everything)
+        if not starts.regions:
+            raise RequestError("there is nowhere to start from; no aperture is open")
         # All regions have the same cone. Where it is only an axis, a point 1 m ahead of the hand
         # keeps to it: the gradient of the angle would vanish there.
         (middle, angle), ahead = starts.regions[0].cone, np.array([1.0, 0.0, 0.0])
@@ -121,6 +123,18 @@ class LicProgram(MathematicalProgram):
         self.AddCost(weakly(self._cost), everything)
         bindings: list[Any] = [*self.GetAllConstraints(), *self.GetAllCosts()]
         self._own = [binding.evaluator() for binding in bindings]
+        self.set_region(starts.regions[0])
+
+    def set_region(self, region: Region) -> None:
+        """Makes a region the one whose bounds of x0 and b0 hold, at first that of `regions[0]`."""
+        low, high = region.position
+        self._base.set_bounds(region.b0_lower, region.b0_upper)
+        self._place.set_bounds(low, high)
+        if self._axis is not None:
+            direction, _ = region.cone
+            free = np.where(direction == 0.0, 0.0, np.inf)
+            self._axis.set_bounds(low + direction - free, high + direction + free)
+        self._chance = float(self.situation.starts.chance(region.lower[None])[0])
 
     def solve(self, region: Region, start: Start) -> Start:
         """Returns where the solver ends in a region, feasible or not.
@@ -130,14 +144,7 @@ class LicProgram(MathematicalProgram):
             start: Where to begin, with joint angles.
         """
         assert start.q is not None
-        low, high = region.position
-        self._base.set_bounds(region.b0_lower, region.b0_upper)
-        self._place.set_bounds(low, high)
-        if self._axis is not None:
-            direction, _ = region.cone
-            free = np.where(direction == 0.0, 0.0, np.inf)
-            self._axis.set_bounds(low + direction - free, high + direction + free)
-        self._chance = float(self.situation.starts.chance(start.x0[None])[0])
+        self.set_region(region)
         result = self._solver.Solve(self, np.append(start.b0, start.q), self._options)
         b0, q = result.GetSolution(self.b0), result.GetSolution(self.q)
         if not np.all(np.isfinite([*b0, *q])):  # There is nothing feasible.

@@ -2,16 +2,18 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from lic_drake.clutter.board import ApertureBoard
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import ScenarioError
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.start import Starts
-from lic_drake.reach.task import Stand
-from lic_drake.starts.board import BoardStarts, standing_at
+from lic_drake.starts.board import BoardStarts
 from lic_drake.starts.feasible import FeasibleStarts
 from lic_drake.starts.line import LineStarts
 from lic_drake.starts.region import Region, find_regions
+from lic_drake.types import Vector
 
 __all__ = [
     "BoardStarts",
@@ -22,7 +24,6 @@ __all__ = [
     "find_regions",
     "line_starts",
     "make_starts",
-    "standing_at",
     "training_starts",
 ]
 
@@ -43,7 +44,7 @@ def make_starts(
     """
     if scenario.arm().is_planar:
         return line_starts(scenario, instance)
-    return board_starts(scenario, instance, scenario.task.stand if moves else None)
+    return board_starts(scenario, instance, moves)
 
 
 def line_starts(scenario: Scenario, instance: ClutterInstance) -> LineStarts:
@@ -55,14 +56,15 @@ def line_starts(scenario: Scenario, instance: ClutterInstance) -> LineStarts:
 
 
 def board_starts(
-    scenario: Scenario, instance: ClutterInstance, stand: Stand | None = None
+    scenario: Scenario, instance: ClutterInstance, moves: bool = False, b0: Vector | None = None
 ) -> BoardStarts:
     """Returns the starts of an arm in space at the open apertures of an environment.
 
     Args:
         scenario: The scenario.
         instance: The environment.
-        stand: Where base and torso may be; by default they do not move.
+        moves: Whether base and torso may move as the task allows.
+        b0: Where they are otherwise, shape (3,), metres; by default as the task has it.
 
     Raises:
         ScenarioError: The arm is one of the plane, or the environment has no board of apertures.
@@ -73,8 +75,12 @@ def board_starts(
             "starts in apertures need an arm in space, as pr2, and a board of apertures, as in"
             f" sphere-aperture-clutter; {scenario.category} with {scenario.robot} has other starts"
         )
-    stand = stand or standing_at(0.0, scenario.task.torso_m)
-    return BoardStarts(scenario=scenario, instance=instance, stand=stand)
+    stand = scenario.task.stand
+    low = high = np.array([0.0, 0.0, scenario.task.torso_m]) if b0 is None else b0
+    if moves and stand is not None:
+        low = np.array([0.0, stand.y_min_m, stand.torso_min_m])
+        high = np.array([0.0, stand.y_max_m, stand.torso_max_m])
+    return BoardStarts(scenario=scenario, instance=instance, b0_lower=low, b0_upper=high)
 
 
 def training_starts(scenario: Scenario, stream: str, environment: int) -> Starts:

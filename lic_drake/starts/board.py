@@ -6,13 +6,13 @@ from functools import cached_property, lru_cache
 from itertools import product
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from lic_drake.clutter.board import ApertureBoard
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import RequestError
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.start import Start, Starts
-from lic_drake.reach.task import Stand
 from lic_drake.robots.arm import Arm
 from lic_drake.scene.collision import CollisionChecker
 from lic_drake.scene.scene import SceneConfig
@@ -43,14 +43,16 @@ class BoardStarts(FeasibleStarts):
     Attributes:
         scenario: The scenario, with an arm in space and a board of apertures.
         instance: The environment.
-        stand: Where base and torso may be.
+        b0_lower: From where base and torso may be, shape (3,), metres.
+        b0_upper: To where, shape (3,), metres.
         probability_open: How likely each open aperture really is open, shape (k,); None where that
             is certain.
     """
 
     scenario: Scenario
     instance: ClutterInstance
-    stand: Stand
+    b0_lower: Vector
+    b0_upper: Vector
     probability_open: Vector | None = None
 
     effort = Effort(
@@ -77,14 +79,13 @@ class BoardStarts(FeasibleStarts):
     @cached_property
     def regions(self) -> tuple[Region, ...]:
         """One for each open aperture: base, torso and the roll of the hand are free."""
-        b0_lower, b0_upper = self._ends
         # Turns about Wx are quaternions (cos, sin, 0, 0) of half the angle.
         return tuple(
             Region(
                 lower=np.array([*p_WA, 0.0, -1.0, 0.0, 0.0]),
                 upper=np.array([*p_WA, 1.0, 1.0, 0.0, 0.0]),
-                b0_lower=b0_lower,
-                b0_upper=b0_upper,
+                b0_lower=self.b0_lower,
+                b0_upper=self.b0_upper,
             )
             for p_WA in self.p_WA
         )
@@ -102,9 +103,8 @@ class BoardStarts(FeasibleStarts):
     @cached_property
     def grid(self) -> Starts:
         """All open apertures, from bases and heights of the torso in equal steps."""
-        (_, y_min, torso_min), (_, y_max, torso_max) = self._ends
-        y, torso = _steps(y_min, y_max, GRID_M[0]), _steps(torso_min, torso_max, GRID_M[1])
-        b0 = tuple((0.0, *place) for place in product(y.tolist(), torso.tolist()))
+        y, torso = (self._steps(axis, GRID_M[axis - 1]).tolist() for axis in (1, 2))
+        b0 = tuple((0.0, *place) for place in product(y, torso))
         found = _preferred_before_bare_board(self.arm, _numbers(self.board), b0)
         if len(self.p_WA) == len(self.board.aperture_centres()):
             return found
@@ -123,17 +123,18 @@ class BoardStarts(FeasibleStarts):
         an L1 kernel has kinks there, and the process its peaks.
         """
         found = self.grid.take(np.zeros(0, dtype=int))
-        (_, y_min, torso_min), (_, y_max, torso_max) = self._ends
+        stand = self.scenario.task.stand
+        learned = ([], []) if stand is None else (stand.training_y_m, stand.training_torso_m)
         for p_WA in self.p_WA:
             here = np.all(np.isclose(self.grid.x0[:, :3], p_WA), axis=1)
             if np.all(values[here] == -np.inf):
                 continue
             x0 = self.grid.x0[np.flatnonzero(here)[np.argmax(values[here])]]
-            _, across, up = (x0[:3] - self.board.aperture_centres()).T
-            learned = np.add.outer(across, self.stand.training_y_m)
-            y = _merge(_steps(y_min, y_max, LATTICE_M), learned)
-            learned = np.add.outer(up, self.stand.training_torso_m)
-            torso = _merge(_steps(torso_min, torso_max, LATTICE_M), learned)
+            apart = (x0[:3] - self.board.aperture_centres()).T[1:]
+            y, torso = (
+                self._steps(axis, LATTICE_M, np.add.outer(apart[axis - 1], learned[axis - 1]))
+                for axis in (1, 2)
+            )
             b0 = np.array([[0.0, *place] for place in product(y, torso)])
             found = found.join(Starts(np.tile(x0, (len(b0), 1)), b0))
         return found
@@ -141,7 +142,8 @@ class BoardStarts(FeasibleStarts):
     def neighbours(self, some: Starts, step_m: float) -> Starts:
         """Returns the eight neighbours of each base and torso height, each once."""
         steps = np.array([[0.0, *s] for s in product((-step_m, 0.0, step_m), repeat=2) if any(s)])
-        b0 = np.round(np.clip(some.b0[:, None] + steps, *self._ends), _DECIMALS).reshape(-1, 3)
+        b0 = np.clip(some.b0[:, None] + steps, self.b0_lower, self.b0_upper)
+        b0 = np.round(b0, _DECIMALS).reshape(-1, 3)
         x0 = np.repeat(some.x0, len(steps), axis=0)
         _, first = np.unique(np.hstack([x0, b0]), axis=0, return_index=True)
         return Starts(x0[first], b0[first])
@@ -154,13 +156,9 @@ class BoardStarts(FeasibleStarts):
         return self.checker.first_free(b0, self.arm.solve_ik(x0_R, near))
 
     def nearest(self, x0: Vector, b0: Vector) -> Start | None:
-        """Returns what Eq. (5) prefers in the aperture of a hand pose from a base, else None."""
+        """Returns what Eq. (5) prefers in the aperture of a hand pose or position, else None."""
         (found,) = _preferred(self.arm, self.checker, x0[None, :3], b0)
         return found
-
-    def at(self, p_WA: Vector, b0: Vector) -> Start | None:
-        """Returns what Eq. (5) prefers in an aperture, shape (3,), from a base; None if nothing."""
-        return self.nearest(np.append(p_WA, [1.0, 0.0, 0.0, 0.0]), b0)
 
     def chance(self, x0: Vector) -> Vector:
         """Returns how likely the apertures of n hand poses are open, shape (n,)."""
@@ -171,8 +169,10 @@ class BoardStarts(FeasibleStarts):
 
     def training(self, stream: str, environment: int) -> Starts:
         """Returns one for each aperture, from the environment's place of the training stand."""
-        place = standing_at(*self.stand.for_training(environment))
-        return replace(self, stand=place).grid.without_q()
+        b0, stand = self.home, self.scenario.task.stand
+        if stand is not None:
+            b0[1:] = stand.for_training(environment)
+        return replace(self, b0_lower=b0, b0_upper=b0).grid.without_q()
 
     def nearest_aperture(self, y_m: float, z_m: float) -> Vector:
         """Returns the centre of the open aperture at a place in the board, shape (3,), metres.
@@ -189,22 +189,13 @@ class BoardStarts(FeasibleStarts):
             )
         return p_WA
 
-    @property
-    def _ends(self) -> tuple[Vector, Vector]:
-        low = np.array([0.0, self.stand.y_min_m, self.stand.torso_min_m])
-        return low, np.array([0.0, self.stand.y_max_m, self.stand.torso_max_m])
-
-
-def standing_at(y_m: float, torso_m: float) -> Stand:
-    """Returns one place of the base and one height of the torso, metres."""
-    return Stand(
-        y_min_m=y_m,
-        y_max_m=y_m,
-        torso_min_m=torso_m,
-        torso_max_m=torso_m,
-        training_y_m=[y_m],
-        training_torso_m=[torso_m],
-    )
+    def _steps(self, axis: int, step_m: float, more: ArrayLike = ()) -> Vector:
+        """Returns b0 along an axis, at most a step apart, and those of more numbers between."""
+        low, high = self.b0_lower[axis], self.b0_upper[axis]
+        count = int(np.ceil((high - low) / step_m - 1e-9)) + 1
+        more = np.ravel(more)
+        inside = more[(more > low) & (more < high)]
+        return np.unique(np.round(np.append(np.linspace(low, high, count), inside), _DECIMALS))
 
 
 _Numbers = tuple[tuple[str, object], ...]
@@ -246,15 +237,3 @@ def _preferred(
         q = checker.first_free(b0, angles)
         # Exactly the centre; of the pose only the roll is left to the arm.
         yield None if q is None else Start(np.append(p_WE, arm.tip_pose(q)[3:]), b0, q)
-
-
-def _steps(low: float, high: float, step: float) -> Vector:
-    """Returns numbers from low to high, both included, apart by at most a step."""
-    count = int(np.ceil((high - low) / step - 1e-9)) + 1
-    return np.round(np.linspace(low, high, count), _DECIMALS)
-
-
-def _merge(steps: Vector, more: Vector) -> Vector:
-    """Returns steps and those of more numbers that lie between their ends, in order."""
-    inside = more[(more > steps[0]) & (more < steps[-1])]
-    return np.unique(np.round(np.append(steps, inside), _DECIMALS))

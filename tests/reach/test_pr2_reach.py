@@ -16,7 +16,7 @@ from lic_drake.reach.simulation import Simulation
 from lic_drake.reach.start import Start
 from lic_drake.reach.trace import ReachResult
 from lic_drake.robots.pr2 import Q_HOME
-from lic_drake.starts import board_starts, standing_at
+from lic_drake.starts import board_starts
 
 PRECISE = load_scenario("sphere-aperture-clutter", "{stop: {success_distance_m: 0.01}}")
 FREE = Environment(PRECISE, spheres())
@@ -85,7 +85,7 @@ def test_a_torso_beyond_its_range_is_refused() -> None:
 
 def test_a_reach_into_forty_spheres_gives_the_same_record_again() -> None:
     instance = BRIEF.sample_instance("training", 1)
-    start = board_starts(BRIEF, instance, standing_at(0.02, 0.16))
+    start = board_starts(BRIEF, instance, b0=np.array([0.0, 0.02, 0.16]))
     # Base and tool 1 cm nearer to the spheres than starts are: a request may be of any base.
     p_WR, x0 = np.array([0.01, 0.02]), start.grid.x0[8] + np.eye(7)[0] * 0.01
     p_WG = BRIEF.goals("training", 1)[6]

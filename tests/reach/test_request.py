@@ -14,9 +14,11 @@ from lic_drake.errors import RequestError
 from lic_drake.experience.schema import to_records
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
+from lic_drake.reach.record import make_record as real_record
 from lic_drake.reach.request import ReachRecord, ReachRequest, check_goal
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.start import Start
+from lic_drake.reach.trace import ReachResult, ReachTrace
 
 SCENARIO = load_scenario("cylinder-clutter")
 
@@ -102,6 +104,8 @@ def test_a_record_leads_back_to_prescribed_joint_angles(
         if asked.start.q is not None:
             record = replace(record, q_start=tuple(asked.start.q))
         assert ReachRequest.from_record(record, scenario) == asked
+    nothing = ReachResult("invalid_start", ReachTrace(), "")
+    assert ReachRequest.from_record(real_record(request, nothing, 0.0), scenario) == request
     keys = {replace(request, start=replace(start, q=q)).key for q in (None, np.full(7, 0.1))}
     assert len(keys) == 2
 

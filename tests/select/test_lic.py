@@ -1,5 +1,7 @@
 """LIC's selection for both robots: against dense scans, random samples and known optima."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.pr2_reference import link_poses
@@ -296,7 +298,7 @@ RIDGE = SuccessModel(estimator=Ridge(), features=ROLLING)
 
 def before_board(environment: int, *failed: FailedReach) -> Situation:
     instance = BLOCKED.sample_instance("holdout", environment)
-    starts = board_starts(BLOCKED, instance, BLOCKED.task.stand)
+    starts = board_starts(BLOCKED, instance, moves=True)
     return Situation(p_WG=BLOCKED.sample_goal("holdout", environment), starts=starts, failed=failed)
 
 
@@ -370,7 +372,7 @@ def test_a_translated_board_has_a_translated_answer() -> None:
             "sphere-aperture-clutter", text.format(-0.29 + shift, -0.2 + shift, shift)
         )
         instance = scenario.sample_instance("holdout", 0)
-        starts = board_starts(scenario, instance, scenario.task.stand)
+        starts = board_starts(scenario, instance, moves=True)
         asked = Situation(p_WG=np.array([0.84, -0.2 + shift, 0.9]), starts=starts)
         chosen.append(LicSelector(RIDGE).select(asked))
     here, there = (item.start for item in chosen)
@@ -392,12 +394,7 @@ def test_an_aperture_that_may_be_blocked_counts_less() -> None:
     sure = LicSelector(RIDGE).select(asked)
     at = np.argmin(np.linalg.norm(asked.starts.p_WA - sure.start.x0[:3], axis=1))
     chance = np.where(np.arange(len(asked.starts.p_WA)) == at, 0.1, 1.0)
-    starts = BoardStarts(
-        scenario=BLOCKED,
-        instance=asked.starts.instance,
-        stand=asked.starts.stand,
-        probability_open=chance,
-    )
+    starts = replace(asked.starts, probability_open=chance)
     other = LicSelector(RIDGE).select(Situation(p_WG=asked.p_WG, starts=starts))
     assert np.linalg.norm(other.start.x0[:3] - sure.start.x0[:3]) > 0.19
 

@@ -17,7 +17,7 @@ from lic_drake.select.situation import Situation
 from lic_drake.starts import Region, board_starts, find_regions
 
 GOAL = np.array([0.6, 0.1, 0.0])
-BOARD = board_starts(SCENARIO, SCENARIO.sample_instance("holdout", 0), SCENARIO.task.stand)
+BOARD = board_starts(SCENARIO, SCENARIO.sample_instance("holdout", 0), moves=True)
 P_WG = np.array([0.84, -0.2, 0.9])
 ROLLING = FeatureMap(goal=("goal_y", "goal_z"), start=("start_y", "start_z", "start_qx"))
 """Features of a hand behind a board that may roll."""

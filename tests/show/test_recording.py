@@ -16,7 +16,7 @@ from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.show.approach import Approach
 from lic_drake.show.recording import MOVE_S, PAUSE_S, Recording, frame_rate
-from lic_drake.starts import board_starts, standing_at
+from lic_drake.starts import board_starts
 
 TICKS_PER_SECOND = 250
 P_WG = np.array([0.6, 0.1, 0.0])
@@ -89,7 +89,7 @@ def test_it_shows_every_object_and_plays_offline(recorded: tuple[list[ReachTrace
 def test_the_robot_moves_base_torso_and_arm_in_that_order_and_the_arm_goes_back() -> None:
     scenario = load_scenario("sphere-aperture-clutter", "{stop: {timeout_s: 0.4}}")
     instance = scenario.sample_instance("training", 0)
-    starts = board_starts(scenario, instance, standing_at(0.05, 0.2))
+    starts = board_starts(scenario, instance, b0=np.array([0.0, 0.05, 0.2]))
     b0, q, x0 = starts.grid.b0[7], starts.grid.q[7], starts.grid.x0[7]
     p_WG = scenario.goals("training", 0)[4]
     environment = Environment(scenario, instance, b0=np.array([0.0, 0.05, 0.2]))

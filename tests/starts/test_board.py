@@ -8,13 +8,13 @@ from support.pr2_reference import link_poses
 from lic_drake.errors import RequestError, ScenarioError
 from lic_drake.reach.environment import Environment
 from lic_drake.reach.scenario import load_scenario
-from lic_drake.starts import BoardStarts, board_starts, make_starts, standing_at, training_starts
+from lic_drake.starts import BoardStarts, board_starts, make_starts, training_starts
 
 INSTANCE = SCENARIO.sample_instance("training", 0)
 STILL = board_starts(SCENARIO, INSTANCE)
 STAND = SCENARIO.task.stand
 assert STAND is not None
-STARTS = board_starts(SCENARIO, INSTANCE, STAND)
+STARTS = board_starts(SCENARIO, INSTANCE, moves=True)
 BLOCKED = load_scenario("sphere-aperture-clutter", "{clutter: {num_blocked: 12}}")
 
 
@@ -130,7 +130,7 @@ def test_the_lattice_fills_the_stand_and_neighbours_lie_beside_it() -> None:
 
 def test_a_robot_that_moves_with_its_environment_starts_alike() -> None:
     """The translation T_b0 of Eq. (3)."""
-    moved = board_starts(SCENARIO, INSTANCE, standing_at(-0.05, 0.15)).grid
+    moved = board_starts(SCENARIO, INSTANCE, b0=np.array([0.0, -0.05, 0.15])).grid
     other = load_scenario(
         "sphere-aperture-clutter", "{clutter: {board_centre: [0.53, -0.24, 0.89]}}"
     )
