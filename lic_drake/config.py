@@ -1,4 +1,4 @@
-"""Configurations: dataclasses whose fields are checked, and their reading from YAML."""
+"""Configuration dataclasses: validation of fields, and reading from YAML."""
 
 import dataclasses
 import math
@@ -12,9 +12,11 @@ import yaml
 from lic_drake.errors import LicError, ScenarioError
 
 MAX_YAML_BYTES = 1_000_000
-"""Longer YAML texts are refused: none of ours has a tenth of it."""
+"""Maximum size of a YAML text; ours are a tenth of it."""
 
 _MAX = sys.float_info.max
+# What Drake's reader raises for data that do not match the schema.
+_SCHEMA_ERRORS = (AssertionError, AttributeError, RuntimeError, TypeError, ValueError)
 
 
 def check_numbers(
@@ -29,21 +31,21 @@ def check_numbers(
     ascending: Collection[tuple[str, str]] = (),
     error: type[LicError] = ScenarioError,
 ) -> None:
-    """Checks numeric fields of a configuration; each is a number or a list of numbers.
+    """Validates numeric fields, given by name; each is a number or a list of numbers.
 
     Args:
         config: The configuration.
-        finite: Names of fields that must be finite.
-        positive: Names of fields that must be positive and finite.
-        non_negative: Names of fields that must be 0 or more and finite.
-        ranges: Lowest and highest allowed value, which may be infinite, by name.
-        vectors: Number of components, all finite, by name.
-        intervals: Names of fields that must be [least, most].
-        ascending: Pairs of names; the first field must not exceed the second, in any component.
-        error: What to raise.
+        finite: Fields that must be finite.
+        positive: Fields that must be positive and finite.
+        non_negative: Fields that must be non-negative and finite.
+        ranges: Minimum and maximum of fields, which may be infinite.
+        vectors: Number of components of fields, all finite.
+        intervals: Fields that must be [least, most].
+        ascending: Pairs of fields; no component of the first may exceed that of the second.
+        error: Exception to raise.
 
     Raises:
-        LicError: A field does not fit; the message names it, its value and the limit.
+        LicError: A field is invalid; the message names it, its value and the limit.
     """
     limits: list[tuple[str, float, float, str]] = [
         *((name, -_MAX, _MAX, "a finite number") for name in finite),
@@ -72,11 +74,11 @@ def check_numbers(
 
 
 def read_mapping(text: str | bytes, source: str) -> dict[str, Any]:
-    """Returns the data in YAML text that must be a mapping; nothing in it is executed.
+    """Parses a YAML mapping safely; empty text is an empty mapping.
 
     Args:
-        text: The text; empty text is an empty mapping.
-        source: Where it comes from, for messages.
+        text: The text.
+        source: Its origin, for messages.
 
     Raises:
         ScenarioError: It is longer than `MAX_YAML_BYTES` or not a YAML mapping.
@@ -95,26 +97,25 @@ def read_mapping(text: str | bytes, source: str) -> dict[str, Any]:
 
 
 def merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
-    """Returns `base` with the values of `over` put over it, level by level."""
+    """Returns `base` recursively updated with `over`."""
     merged = dict(base)
     for key, value in over.items():
-        old = merged.get(key)
-        both = isinstance(old, dict) and isinstance(value, dict)
+        both = isinstance(merged.get(key), dict) and isinstance(value, dict)
         merged[key] = merge(merged[key], value) if both else value
     return merged
 
 
 def read_section[T](schema: type[T], data: Any, source: str, defaults: T | None = None) -> T:
-    """Fills a dataclass with Drake's typed YAML reader, which refuses unknown keys.
+    """Fills a dataclass by Drake's typed YAML reader, which rejects unknown keys.
 
     Args:
         schema: The dataclass; each field needs a default.
         data: A mapping of its fields, or None for an empty one.
-        source: Where the data come from, for messages.
-        defaults: Values of what is left out; those of the dataclass by default.
+        source: Its origin, for messages.
+        defaults: Values of omitted fields; those of the dataclass by default.
 
     Raises:
-        ScenarioError: A key or value that does not fit.
+        ScenarioError: A key or value is invalid.
     """
     from pydrake.common.yaml import yaml_load_typed  # Configurations alone do not need Drake.
 
@@ -129,20 +130,12 @@ def read_section[T](schema: type[T], data: Any, source: str, defaults: T | None 
         )
         _check(section)
         return section
-    # Drake's reader reports what does not fit the schema in these ways.
-    except (
-        AssertionError,
-        AttributeError,
-        RuntimeError,
-        ScenarioError,
-        TypeError,
-        ValueError,
-    ) as error:
+    except (*_SCHEMA_ERRORS, ScenarioError) as error:
         raise ScenarioError(f"{source}: {' '.join(str(error).split())}") from None
 
 
 def _check(section: Any) -> None:
-    """Runs the checks of a dataclass and its parts: the reader sets fields after `__init__`."""
+    """Runs `__post_init__` recursively, because the reader sets fields after `__init__`."""
     for item in dataclasses.fields(section):
         value = getattr(section, item.name)
         if dataclasses.is_dataclass(value):

@@ -1,19 +1,16 @@
-"""The exceptions that a user may cause; the command line prints them as one line."""
+"""Exceptions for user errors; the command line prints them as one line."""
 
 
 class LicError(Exception):
-    """Base class: something the user gave or asked for cannot be used as it is.
-
-    The message names the value, the limit, and what to do.
-    """
+    """Base class; messages name the value, the limit and the remedy."""
 
 
 class ScenarioError(LicError):
-    """A scenario file or one of its values is unusable."""
+    """A scenario file or one of its values is invalid."""
 
 
 class RequestError(LicError):
-    """A reach was asked for that cannot be made (goal out of reach, bad start pose, NaN)."""
+    """A requested reach is impossible (unreachable goal, infeasible start, NaN)."""
 
 
 class LibraryError(LicError):
@@ -21,27 +18,27 @@ class LibraryError(LicError):
 
 
 class EstimateError(LicError):
-    """An estimator is unknown, not fitted yet, or was given unusable rows."""
+    """An estimator is unknown, not fitted, or was given invalid rows."""
 
 
 class ClusterError(LicError):
-    """A cluster cannot be reached, or its workers cannot be used as they are."""
+    """A cluster is unreachable, or its workers are incompatible."""
 
 
 class RenderingError(LicError):
-    """Cameras cannot be simulated on this machine as it is."""
+    """Cameras cannot be simulated on this machine."""
 
 
 class ModelError(LicError):
-    """A description of a robot, or its meshes, cannot be had."""
+    """A robot model or its meshes could not be found or loaded."""
 
 
 class PerceptionError(LicError):
-    """What was looked for cannot be found in the images."""
+    """The board, an aperture or the goal was not found in the images."""
 
 
 def quoted(value: object) -> str:
-    """Returns what a file says for a message: on one line, and not longer than is useful."""
+    """Returns a value from a file for a message, printable and truncated to 40 characters."""
     text = str(value)
     short = text if len(text) <= 40 else f"{text[:40]}..."
     return short if short.isprintable() else ascii(short)

@@ -1,25 +1,19 @@
-"""Wilson score intervals of success rates: every rate of the project comes with one."""
+"""Wilson score intervals of success rates."""
 
 import math
 from statistics import NormalDist
 
 
 def wilson_interval(successes: int, n: int, confidence: float = 0.9) -> tuple[float, float]:
-    """Returns the Wilson score interval of a binomial proportion.
-
-    The set of all p whose normal test statistic |successes / n - p| / sqrt(p (1 - p) / n) is not
-    above the normal quantile z (Wilson 1927).
+    """Returns the Wilson score interval of a binomial proportion (Wilson 1927).
 
     Args:
         successes: Number of successes, 0 to n.
-        n: Number of trials; with none every rate is possible and (0, 1) is returned.
+        n: Number of trials; the interval is (0, 1) if there are none.
         confidence: Coverage, between 0 and 1; the paper's figures show 0.9.
 
-    Returns:
-        Lower and upper end, within [0, 1].
-
     Raises:
-        ValueError: The counts or the confidence make no sense.
+        ValueError: The counts or the confidence are out of range.
     """
     if not 0 <= successes <= n:
         raise ValueError(f"successes must be from 0 to n, got {successes} of {n}")
@@ -30,7 +24,7 @@ def wilson_interval(successes: int, n: int, confidence: float = 0.9) -> tuple[fl
     z = NormalDist().inv_cdf(0.5 + 0.5 * confidence)
     centre = successes + 0.5 * z**2
     half_width = z * math.sqrt(successes * (n - successes) / n + 0.25 * z**2)
-    # The ends are exactly 0 without a success and exactly 1 without a failure.
+    # Exactly 0 without successes and exactly 1 without failures.
     low = (centre - half_width) / (n + z**2) if successes > 0 else 0.0
     high = (centre + half_width) / (n + z**2) if successes < n else 1.0
     return low, high

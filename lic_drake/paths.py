@@ -1,4 +1,4 @@
-"""Finds the models folder, in a checkout or in an installed wheel."""
+"""Location of the models folder, in a checkout or an installed wheel."""
 
 from functools import cache
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 
 @cache
 def models_dir() -> Path:
-    """Returns the folder with robot descriptions, scenarios and shipped libraries."""
+    """Returns the folder of robot models, scenarios and shipped libraries."""
     package = Path(__file__).resolve().parent
     for candidate in (package / "models", package.parent / "models"):
         if (candidate / "package.xml").is_file():
@@ -15,22 +15,22 @@ def models_dir() -> Path:
 
 
 def scenarios_dir() -> Path:
-    """Returns the folder with the scenario YAML files."""
+    """Returns the folder of scenario files."""
     return models_dir() / "scenarios"
 
 
 def shipped_library(category: str) -> Path:
-    """Returns the folder of the experience library shipped for a clutter category."""
+    """Returns the folder of the experience library shipped for a category."""
     return models_dir() / "experience" / category
 
 
 def shipped_libraries() -> list[Path]:
-    """Returns the folders of all shipped experience libraries, sorted by category."""
+    """Returns the folders of all shipped libraries, sorted by category."""
     return sorted(path for path in (models_dir() / "experience").iterdir() if path.is_dir())
 
 
 def find_library(name_or_path: str | Path) -> Path:
-    """Returns the path of a library: what exists there, or the shipped one of that name."""
+    """Returns the path of a library, or of the shipped one with that name if none exists there."""
     path = Path(name_or_path)
     shipped = shipped_library(path.name)
     return shipped if path.name == str(path) and not path.exists() and shipped.is_dir() else path

@@ -1,4 +1,4 @@
-"""`Registry`: entries by name, from the package and from modules of the user's own."""
+"""`Registry`: named entries from the package and from user modules."""
 
 import os
 from functools import cache
@@ -13,44 +13,35 @@ VARIABLE = "LIC_EXTENSIONS"
 class Registry[T]:
     """Categories, robots or estimators by name.
 
-    Looking a name up first imports the modules that `LIC_EXTENSIONS` names, so that the command
-    line and worker processes, which inherit the environment, know what those modules register.
+    A lookup first imports the modules in `LIC_EXTENSIONS`, so that the command line and worker
+    processes, which inherit the environment, know their entries.
 
     Attributes:
         entries: The entries registered so far.
     """
 
     def __init__(self, kind: str, error: type[LicError]) -> None:
-        """Makes an empty registry.
-
-        Args:
-            kind: What an entry is, for messages.
-            error: What to raise.
-        """
+        """Creates an empty registry of entries of a kind, named in the errors it raises."""
         self.entries: dict[str, T] = {}
         self._origins: dict[str, str] = {}
         self._kind = kind
         self._error = error
 
     def register(self, name: str, entry: T, made_by: object | None = None) -> None:
-        """Adds an entry.
-
-        The code that registered an entry may register it again, as a notebook cell does that is
-        run twice; no other code may take its name.
+        """Adds an entry; the same code may register it again, as a notebook cell run twice does.
 
         Args:
-            name: The name.
+            name: Letters, digits, hyphens and underscores.
             entry: The entry.
-            made_by: The class or function that tells whose it is; by default the entry itself, or
-                its class.
+            made_by: The class or function that identifies the entry's origin; by default the entry
+                itself, or its class.
 
         Raises:
-            LicError: The name is not a plain word or is taken.
+            LicError: The name is invalid, or taken by other code.
         """
         if not isinstance(name, str) or not name.replace("-", "").replace("_", "").isalnum():
             raise self._error(
-                f"{name!r} cannot be the name of a {self._kind}; use letters, digits, hyphens and"
-                " underscores"
+                f"{name!r} cannot be the name of a {self._kind}; use letters, digits, '-' and '_'"
             )
         maker = entry if made_by is None else made_by
         maker = maker if hasattr(maker, "__qualname__") else type(maker)
@@ -66,7 +57,7 @@ class Registry[T]:
         """Returns the entry with this name.
 
         Raises:
-            LicError: There is none.
+            LicError: The name is unknown.
         """
         load_extensions()
         if name not in self.entries:
@@ -83,7 +74,7 @@ class Registry[T]:
 
 @cache
 def load_extensions() -> None:
-    """Imports the modules that `LIC_EXTENSIONS` names, once per process.
+    """Imports the modules in `LIC_EXTENSIONS`, once per process.
 
     Raises:
         LicError: A module cannot be imported.

@@ -1,7 +1,7 @@
-"""Named seed streams: the only source of randomness in the package.
+"""Named seed streams, the only source of randomness in the package.
 
-Environments for training, evaluation, calibration and hold-out come from different streams, so
-that an evaluation environment can never be in a library.
+Environments for training, evaluation, calibration and hold-out come from different streams, so that
+no library contains an evaluation environment.
 """
 
 import zlib
@@ -15,13 +15,13 @@ STREAMS = ("training", "evaluation", "calibration", "holdout")
 
 
 def make_generator(stream: str, purpose: str, *indices: int) -> np.random.Generator:
-    """Returns the generator of one (stream, purpose, indices) combination.
+    """Returns the generator for a (stream, purpose, indices) combination.
 
     Args:
         stream: One of `STREAMS`.
-        purpose: What is drawn, for instance a clutter category or "goal"; any text.
-        indices: Integers from 0 to 2^32 - 1, for instance the environment's index; always
-            the same number of them for a purpose, because NumPy takes (5,) and (5, 0) for equal.
+        purpose: What is sampled, such as a clutter category or "goal".
+        indices: Integers from 0 to 2^32 - 1, such as the environment's index; always equally many
+            for a purpose, because NumPy treats (5,) and (5, 0) as equal.
 
     Raises:
         RequestError: The stream is unknown or an index is out of range.
@@ -30,7 +30,7 @@ def make_generator(stream: str, purpose: str, *indices: int) -> np.random.Genera
         raise RequestError(f"unknown seed stream {stream!r}; choose one of {', '.join(STREAMS)}")
     if not all(0 <= index < 2**32 for index in indices):
         raise RequestError(f"seed indices must be from 0 to 2^32 - 1, got {list(indices)}")
-    # CRC-32 gives every purpose a fixed number; Python's own hash() changes between processes.
+    # Unlike Python's hash(), CRC-32 is the same in every process.
     return np.random.default_rng(
         [STREAMS.index(stream), zlib.crc32(purpose.encode()), *map(int, indices)]
     )

@@ -1,25 +1,25 @@
-"""Array types for annotations, and the check of their shapes."""
+"""Array types for annotations, and a check of shapes."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
-"""Real numbers; each docstring states shape and unit."""
+"""Real numbers; docstrings state shape and unit."""
 BoolVector = NDArray[np.bool_]
-"""Truth values, for instance a mask."""
+"""Booleans, such as a mask."""
 IntVector = NDArray[np.intp]
-"""Integers, for instance indices."""
+"""Integers, such as indices."""
 
 
 def check_shapes(arrays: object, **shapes: tuple[int | None, ...]) -> None:
-    """Checks the shapes of an object's arrays; an attribute that is None fits.
+    """Checks the shapes of an object's array attributes; None is always valid.
 
     Args:
         arrays: The object.
-        shapes: Expected shape of each attribute; None stands for any length.
+        shapes: Expected shape of each attribute; a length of None matches any.
 
     Raises:
-        ValueError: A shape does not fit.
+        ValueError: A shape is wrong.
     """
     for name, expected in shapes.items():
         value = getattr(arrays, name)

@@ -1,18 +1,15 @@
-"""Methods as functions that do not keep their objects alive."""
+"""Callbacks for Drake that do not keep their objects alive."""
 
 from collections.abc import Callable
 from weakref import WeakMethod
 
 
 def weakly[**P, R](method: Callable[P, R]) -> Callable[P, R]:
-    """Returns a bound method as a function that its object does not live by.
+    """Wraps a bound method so that the wrapper holds only a weak reference to its object.
 
-    What Drake 1.58 holds in C++ - costs and constraints of programs, calculations of abstract
-    output ports - is invisible to Python's collector: an object whose own method is there lives for
-    ever, and with it the diagrams that it knows.
-
-    Args:
-        method: A bound method; its object has to live when the function is called.
+    Callbacks that Drake 1.58 holds in C++ (costs, constraints, abstract output ports) are invisible
+    to Python's garbage collector: an object whose own method is among them is never freed, nor are
+    the diagrams it refers to. The object must be alive when the wrapper is called.
     """
     weak = WeakMethod(method)
 

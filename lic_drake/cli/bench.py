@@ -2,6 +2,7 @@
 
 import argparse
 import json
+from dataclasses import asdict
 
 from lic_drake.cli.arguments import (
     Subparsers,
@@ -40,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
 
     speed = measure_reaches(load_scenario(args.scenario, args.set), args.reaches)
     if args.json:
-        print(json.dumps(speed.to_dict()))
+        print(json.dumps(asdict(speed)))
         return 0
     print(
         f"{speed.robot} in {speed.category}: {speed.wall_per_sim_s:.4f} wall seconds per simulated"

@@ -117,7 +117,7 @@ def add_parser(subparsers: Subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Runs the subcommand and returns the exit code."""
     from lic_drake.evaluate.experiment import Evaluation, run_evaluation
-    from lic_drake.evaluate.rates import format_rates, rates_to_dicts, summarize_trials
+    from lic_drake.evaluate.table import format_rates, rates_to_dicts, summarize_trials
     from lic_drake.evaluate.trials import TrialTable
     from lic_drake.paths import shipped_library
 

@@ -1,4 +1,4 @@
-"""Trials of several strategies on the same unseen environments; an environment is a task."""
+"""Evaluation of several strategies on the same unseen environments, one task each."""
 
 import gc
 import time
@@ -37,35 +37,34 @@ from lic_drake.select.registry import (
 from lic_drake.types import Vector
 
 SAY_S = 5.0
-"""Time between two lines about the progress, seconds."""
+"""Time between two progress messages, seconds."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Evaluation:
-    """What is to be tried; plain data that pickles.
+    """The parameters of an evaluation; plain data that can be pickled.
 
     Attributes:
-        experience: Library that the strategies learn from; it says the scenario.
-        results: Folder for `trials.parquet` and the library `reaches` of the evaluation's reaches.
+        experience: Library that the strategies learn from; its scenario is the default.
+        results: Folder for `trials.parquet` and the library `reaches`.
         methods: Strategies, see `lic_drake.select.registry.check_method`.
         environments: Number of environments, from index `first_environment`.
         goals: Number of random goals in each.
-        attempts: How many attempts at a goal at the most.
+        attempts: Maximum number of attempts at a goal.
         stream: Seed stream of environments and goals.
         first_environment: Index of the first environment.
-        fresh: Whether later attempts find the environment as it was drawn.
-        variant: Name for these trials among others in the same folder.
+        fresh: Whether the environment is reset before later attempts.
+        variant: Name of these trials among others in the same folder.
         common_goals: Whether all environments have the goals of the first one.
-        second_attempts: Library of real second attempts that LIC-2 learns from; None: D2 is made
-            from single reaches, as in the paper.
-        overrides: YAML text put over the library's scenario: what is tried may differ from what
-            was learned from, for instance by apertures that are blocked.
+        second_attempts: Library of real second attempts for LIC-2; None: D2 is composed of single
+            reaches, as in the paper.
+        overrides: YAML text merged into the scenario, for instance to block apertures.
         moves: Whether a PR2 may move base and torso before a reach.
-        scenario_name: Scenario that is tried where it is not the library's, a name or a path: what
-            was learned in one kind of clutter is used in another.
-        cameras: Cameras that have to find apertures and goal, see
-            `lic_drake.perception.config.load_cameras`; none: both are known. A reach is then a
-            success if it ends in the ball.
+        scenario_name: Name or path of a scenario other than the library's, to evaluate transfer
+            between categories.
+        cameras: Cameras that perceive apertures and goal, see
+            `lic_drake.perception.config.load_cameras`; empty: both are known. With cameras, a reach
+            succeeds if it ends in the ball.
     """
 
     experience: Path
@@ -87,7 +86,7 @@ class Evaluation:
 
     @property
     def trials_path(self) -> Path:
-        """File with a row for each attempt."""
+        """File with one row per attempt."""
         return self.results / "trials.parquet"
 
     @property
@@ -96,10 +95,10 @@ class Evaluation:
         return ExperienceLibrary(self.results / "reaches")
 
     def scenario(self) -> Scenario:
-        """Returns the scenario that is tried.
+        """Returns the evaluated scenario.
 
         Raises:
-            LicError: The library cannot be read, or an override does not fit.
+            LicError: The library cannot be read, or an override is invalid.
         """
         if self.scenario_name:
             return load_scenario(self.scenario_name, self.overrides)
@@ -114,16 +113,15 @@ def run_evaluation(
 ) -> list[TrialRow]:
     """Runs every strategy on the same goals in the same environments.
 
-    Reaches are kept, a shard for each environment, and not simulated again; selections are made
-    anew, so that the trials always are those of the present strategies and libraries.
+    Stored reaches (one shard per environment) are reused; selections are always recomputed.
 
     Args:
-        evaluation: What is to be tried.
-        workers: Where to run it; by default in this process.
-        say: Gets a line now and then.
+        evaluation: The parameters.
+        workers: Where to run it; this process by default.
+        say: Receives progress messages.
 
     Returns:
-        The rows of these trials; the file keeps those of other variants and strategies, too.
+        The rows of these trials; the file also keeps those of other variants and strategies.
 
     Raises:
         LicError: A method is unknown, a library cannot be read or written, or an environment
@@ -136,10 +134,9 @@ def run_evaluation(
     library.create()
     if library.shard_paths() and library.header().scenario_digest != scenario.digest:
         raise LibraryError(
-            f"{library.path} holds reaches of another scenario than the one to be tried"
-            f" ({evaluation.scenario_name or evaluation.experience},"
-            f" {evaluation.overrides or 'as it is'}); choose another"
-            " folder for the results"
+            f"{library.path} holds reaches of another scenario than"
+            f" {evaluation.scenario_name or evaluation.experience} with"
+            f" {evaluation.overrides or 'no overrides'}; choose another folder for the results"
         )
     plan = _Plan.of(evaluation, scenario)
     first = evaluation.first_environment
@@ -182,16 +179,14 @@ def run_evaluation(
         library.compact()
     rows.sort(key=lambda row: (row.method, row.environment, row.goal, row.attempt))
     others = read_trials(evaluation.trials_path) if evaluation.trials_path.exists() else []
-    write_trials(evaluation.trials_path, [*(o for o in others if not _is_of(o, evaluation)), *rows])
+    replaced = {(evaluation.variant, method) for method in evaluation.methods}
+    kept = [row for row in others if (row.variant, row.method) not in replaced]
+    write_trials(evaluation.trials_path, [*kept, *rows])
     return rows
 
 
-def _is_of(row: TrialRow, evaluation: Evaluation) -> bool:
-    return row.variant == evaluation.variant and row.method in evaluation.methods
-
-
 def _first_rates(rows: Sequence[TrialRow]) -> str:
-    """Returns the success rate of first attempts of each strategy so far."""
+    """Formats each strategy's success rate of first attempts so far."""
     parts = []
     for method in sorted({row.method for row in rows}):
         won = [row.success for row in rows if row.method == method and row.attempt == 1]
@@ -201,13 +196,13 @@ def _first_rates(rows: Sequence[TrialRow]) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class _Plan:
-    """What workers need, wherever they are; equal to nothing but itself and its copies.
+    """What workers need; plans are compared by name.
 
     Attributes:
-        name: Different for each run of an evaluation.
-        evaluation: What is to be tried, with absolute paths.
-        scenario: The scenario that is tried.
-        cameras: Cameras that have to find apertures and goal.
+        name: Unique for each run of an evaluation.
+        evaluation: Its parameters, with absolute paths.
+        scenario: The evaluated scenario.
+        cameras: Cameras that perceive apertures and goal.
     """
 
     name: str
@@ -231,7 +226,7 @@ class _Plan:
 
 
 class _Strategies:
-    """The strategies of an evaluation, each fitted when it is first asked for."""
+    """The strategies of an evaluation, each fitted on first use."""
 
     def __init__(self, plan: _Plan) -> None:
         self._plan = plan
@@ -243,7 +238,7 @@ class _Strategies:
         self._fitted: dict[str, Selector] = {}
 
     def selector(self, method: str, environment: int, goal: int) -> Selector:
-        """Returns a strategy for a trial."""
+        """Returns the strategy for a trial."""
         first, later = split_method(method)
         if later is not None:
             return FallbackSelector(
@@ -252,7 +247,7 @@ class _Strategies:
                 method=method,
             )
         if method == "rnd":
-            # Draws of its own for every trial: independent of how many others there are.
+            # A generator for each trial, independent of all others.
             rng = make_generator(self._plan.evaluation.stream, "rnd", environment, goal)
             return RandomSelector(rng=rng)
         if method not in self._fitted:
@@ -267,13 +262,13 @@ class _Strategies:
 
 
 _strategies = lru_cache(maxsize=1)(_Strategies)
-"""A worker keeps the strategies of its evaluation from one environment to the next."""
+"""Workers reuse the strategies of an evaluation between environments."""
 
 
 def _try_environment(
     plan: _Plan, environment: int, known: list[ReachRecord]
 ) -> tuple[list[TrialRow], list[ReachRecord]]:
-    """Runs in a worker: all trials in an environment, and those of its reaches that are new."""
+    """Runs in a worker: returns all trials in an environment, and its new reaches."""
     records = {record.key: record for record in known}
     new: list[ReachRecord] = []
 
@@ -291,7 +286,7 @@ def _try_environment(
             goal=goal,
             attempt=number,
             key=attempt.request.key,
-            # An attempt before the last one failed.
+            # All attempts but the last one failed.
             success=won and number == len(attempts),
             probability=float("nan")
             if attempt.selection.probability is None
@@ -334,14 +329,13 @@ def _trials(
                 last.success if observer is None else observer.touches_ball(last),
             )
         if observer is not None:
-            # A renderer takes 150 MB, and its diagram is a reference cycle: only the collector
-            # frees it.
+            # A renderer takes 150 MB, and only the collector frees its reference cycle.
             del observer
             gc.collect()
 
 
 def _observer(plan: _Plan, environment: int, p_WG: Vector) -> Observer | None:
-    """Returns the observer of an environment; all strategies see the same images."""
+    """Returns the observer of an environment, whose images all strategies share."""
     if plan.cameras is None:
         return None
     return Observer(

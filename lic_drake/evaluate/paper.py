@@ -1,4 +1,4 @@
-"""The paper's Tables I to IV as data, and remarks on where they do not hold; see paper.yaml.
+"""The paper's Tables I to IV as data, with remarks on their errors; see paper.yaml.
 
 Park, Kapusta, Kim, Rehg and Kemp, "Learning to Reach into the Unknown: Selecting Initial Conditions
 When Reaching in Clutter", section VI-B.
@@ -16,7 +16,7 @@ LABELS = {"rnd": "RND", "cost": "COST", "gp": "LIC(GP)", "knn": "LIC(K-NN)"}
 
 
 def label(method: str) -> str:
-    """Returns the paper's name of a strategy; other strategies go by their own."""
+    """Returns the paper's name of a strategy, or else its own."""
     return LABELS.get(method, method)
 
 
@@ -26,8 +26,8 @@ class PaperColumn:
 
     Attributes:
         first: First attempts.
-        second: Second attempts, made where the first one failed.
-        total: Trials with a success in one of the two attempts.
+        second: Second attempts, made after failed first ones.
+        total: Trials that succeeded in either attempt.
         percent: The three rates as printed, percent.
     """
 
@@ -44,7 +44,7 @@ class PaperTable:
     Attributes:
         number: Roman number in the paper.
         category: Clutter category.
-        trials: What was tried, in the words of the caption; "" where it says nothing.
+        trials: Number of trials, in the caption's words; may be empty.
         columns: Results by strategy.
     """
 
@@ -56,12 +56,7 @@ class PaperTable:
 
 @dataclass(frozen=True, kw_only=True)
 class Remark:
-    """A slip of the paper, or what its tests leave out.
-
-    Attributes:
-        place: Number of the table it bears on; "text" for the rest.
-        text: What is written and what is right, or what the numbers also say.
-    """
+    """An error or omission of the paper, in the table numbered `place` or else in its "text"."""
 
     place: str
     text: str
@@ -86,4 +81,4 @@ TABLE_II = {tuple(t["pair"]): TTest(t["df"], t["t"], t["p"]) for t in _DATA["t_t
 """Table II, "paired sample t-tests in cylinder-clutter", by pair of strategies."""
 
 REMARKS = tuple(Remark(**remark) for remark in _DATA["remarks"])
-"""Caveats when comparing with the paper; every sum and test in them is checked by our tests."""
+"""Caveats for comparisons with the paper; our tests check every number in them."""

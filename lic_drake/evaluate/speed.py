@@ -1,11 +1,11 @@
-"""Measures how fast reaches are simulated, and where the time goes."""
+"""Benchmark of the simulation of reaches, with a breakdown of its time."""
 
 import cProfile
 import pstats
 import time
 from collections import defaultdict
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -25,14 +25,14 @@ PARTS = {
     "reach/sleeping": "build",
     "reach/": "rest",
 }
-"""Part of the time by the start of a module's path in the package; the first that fits counts."""
+"""Part of the time by prefix of a module's path in the package; the first match counts."""
 
 STEP = "advance_to"
-"""Name of the method of `lic_drake.reach` that calls Drake's `Simulator.AdvanceTo`: to a profile,
-Drake's own time is that of the Python function that calls it."""
+"""The method of `lic_drake.reach` that calls Drake's `Simulator.AdvanceTo`, to which the profiler
+attributes Drake's own time."""
 
 _PACKAGE = Path(lic_drake.__file__).parent.as_posix() + "/"
-_ROUNDS = 10  # Calls between a module of the package and the function that takes the time.
+_ROUNDS = 10  # Maximum call depth below a module of the package.
 
 _Function = tuple[str, int, str]
 
@@ -45,13 +45,12 @@ class ReachSpeed:
         robot: Name of the robot.
         category: Name of the clutter category.
         reaches: Number of reaches timed.
-        simulated_s: Simulated time of all of them, seconds.
+        simulated_s: Their total simulated time, seconds.
         wall_per_reach_s: Wall time of a reach, seconds.
         wall_per_sim_s: Wall seconds per simulated second.
-        split: Shares of the time of one more environment's reaches under Python's profiler, which
-            makes Python's part look larger than it is: physics (Drake's time steps), sensor
-            (contacts and taxels), mpc, build (models, diagrams, contexts, waking objects), rest
-            (stop rules, records).
+        split: Shares of time under Python's profiler, which overstates Python's part: physics
+            (Drake's time steps), sensor (contacts and taxels), mpc, build (models, diagrams,
+            contexts, waking objects), rest (stop rules, records).
     """
 
     robot: str
@@ -62,21 +61,16 @@ class ReachSpeed:
     wall_per_sim_s: float
     split: dict[str, float]
 
-    def to_dict(self) -> dict[str, Any]:
-        """Returns the figures as a plain dictionary."""
-        return asdict(self)
-
 
 def measure_reaches(scenario: Scenario, reaches: int, per_environment: int = 5) -> ReachSpeed:
     """Times reaches from random starts to random goals in one process.
 
-    The first reach of an environment builds its diagram; that time counts, as it does in a
-    collection.
+    The time to build an environment's diagram counts towards its first reach.
 
     Args:
-        scenario: What to simulate.
-        reaches: How many reaches to time.
-        per_environment: How many of them share an environment.
+        scenario: The scenario.
+        reaches: Number of reaches to time.
+        per_environment: Number of reaches in each environment.
     """
     environments = -(-reaches // per_environment)
     requests = random_requests(scenario, "calibration", environments + 1, per_environment)
@@ -101,8 +95,7 @@ def measure_reaches(scenario: Scenario, reaches: int, per_environment: int = 5) 
 def split_time(stats: pstats.Stats) -> dict[str, float]:
     """Returns the share of each part in a profile; shares add up to 1.
 
-    The time of any other function, of NumPy's or of a robot's kinematics for instance, is that of
-    the parts that call it, in proportion.
+    The time of other functions, such as NumPy's, is divided among the parts that call them.
     """
     functions: Mapping[_Function, Any] = stats.stats  # type: ignore[attr-defined]
     shares: dict[_Function, dict[str, float]] = {f: {_part(f): 1.0} for f in functions if _part(f)}
@@ -126,7 +119,7 @@ def split_time(stats: pstats.Stats) -> dict[str, float]:
 
 
 def _part(function: _Function) -> str:
-    """Returns the part that a function belongs to by itself, or ""."""
+    """Returns the part to which a function belongs, or ""."""
     file, _, name = function
     path = Path(file).as_posix()
     if not path.startswith(_PACKAGE):

@@ -1,4 +1,4 @@
-"""Success counts and tests that compare two strategies."""
+"""Success counts and tests between two strategies."""
 
 import math
 from typing import NamedTuple
@@ -12,19 +12,14 @@ from lic_drake.intervals import wilson_interval
 
 
 class Count(NamedTuple):
-    """Successes among trials.
-
-    Attributes:
-        successes: Number of successes.
-        trials: Number of trials.
-    """
+    """Numbers of successes and trials."""
 
     successes: int
     trials: int
 
     @property
     def rate(self) -> float:
-        """Share of successes; NaN without trials."""
+        """Success rate; NaN without trials."""
         return self.successes / self.trials if self.trials else math.nan
 
     def interval(self, confidence: float = 0.9) -> tuple[float, float]:
@@ -33,16 +28,12 @@ class Count(NamedTuple):
 
 
 def count(success: NDArray[np.bool_]) -> Count:
-    """Returns the number of successes in an array of any shape."""
+    """Counts the successes in an array of any shape."""
     return Count(int(success.sum()), success.size)
 
 
 def mcnemar(a: NDArray[np.bool_], b: NDArray[np.bool_]) -> float:
-    """Returns the p-value of McNemar's exact test for paired successes, shape (n,) each.
-
-    A sign test of the pairs in which exactly one strategy succeeds (McNemar 1947, with binomial
-    instead of normal probabilities).
-    """
+    """Returns the p-value of McNemar's exact (binomial) test for paired successes, shape (n,)."""
     only_a, only_b = int(np.sum(a & ~b)), int(np.sum(b & ~a))
     if only_a + only_b == 0:
         return 1.0
@@ -50,13 +41,7 @@ def mcnemar(a: NDArray[np.bool_], b: NDArray[np.bool_]) -> float:
 
 
 class Difference(NamedTuple):
-    """A difference of two success rates on the same trials with its interval.
-
-    Attributes:
-        value: The difference.
-        low: Lower end of the interval.
-        high: Upper end of the interval.
-    """
+    """A difference of two success rates on the same trials, with its confidence interval."""
 
     value: float
     low: float
@@ -66,16 +51,11 @@ class Difference(NamedTuple):
 def paired_difference(
     a: NDArray[np.bool_], b: NDArray[np.bool_], confidence: float = 0.9
 ) -> Difference:
-    """Returns the success rate of a minus that of b on the same trials.
+    """Returns the success rate of a minus that of b on the same trials, shape (n,), n > 0.
 
     The interval is Wald's for paired proportions with half a trial added to each of the four
-    combinations of outcomes, which keeps its coverage where few trials differ (Agresti and Min
-    2005, "Simple improved confidence intervals for comparing matched proportions").
-
-    Args:
-        a: Successes of one strategy, shape (n,), n > 0.
-        b: Successes of the other, shape (n,).
-        confidence: Coverage of the interval.
+    outcomes, which keeps its coverage when few trials differ (Agresti and Min 2005, "Simple
+    improved confidence intervals for comparing matched proportions").
     """
     only_a, only_b = int(np.sum(a & ~b)), int(np.sum(b & ~a))
     n = len(a) + 2.0
@@ -90,13 +70,7 @@ def paired_difference(
 
 
 class TTest(NamedTuple):
-    """Result of a t-test.
-
-    Attributes:
-        df: Degrees of freedom.
-        t: Test statistic; negative where the first rate is the smaller one.
-        p: Two-sided p-value.
-    """
+    """Degrees of freedom, statistic and two-sided p-value of a t-test."""
 
     df: int
     t: float
@@ -106,21 +80,16 @@ class TTest(NamedTuple):
 def two_sample_t_test(a: Count, b: Count) -> TTest:
     """Compares two success rates by Student's t with pooled variance, as in the paper's Table II.
 
-    The paper calls its tests paired, but its degrees of freedom and all five of its values of t
-    are those of this unpaired test on the totals of two attempts. It ignores that both strategies
-    face the same trials; `mcnemar` does not.
-
-    Args:
-        a: Successes of one strategy.
-        b: Successes of the other.
+    The paper calls its tests paired, but its degrees of freedom and all five values of t are those
+    of this unpaired test on the totals of two attempts. `mcnemar` is paired.
 
     Raises:
-        ValueError: There are fewer than two trials of a strategy.
+        ValueError: Fewer than two trials of a strategy.
     """
     if min(a.trials, b.trials) < 2:
         raise ValueError(f"a t-test needs 2 trials of each strategy, got {a.trials}, {b.trials}")
     df = a.trials + b.trials - 2
-    # Sum of squared deviations of zeros and ones from their mean.
+    # Sum of squared deviations from the mean.
     squares = sum(item.trials * item.rate * (1.0 - item.rate) for item in (a, b))
     error = math.sqrt(squares / df * (1.0 / a.trials + 1.0 / b.trials))
     difference = a.rate - b.rate

@@ -1,11 +1,10 @@
-"""The paper's Tables I to IV from our trials, ours and the paper's numbers side by side."""
+"""The paper's Tables I to IV, with our numbers beside the paper's."""
 
 from collections.abc import Sequence
 
 from lic_drake.evaluate.paper import REMARKS, TABLE_II, PaperColumn, PaperTable, label
 from lic_drake.evaluate.statistics import (
     Count,
-    Difference,
     TTest,
     count,
     mcnemar,
@@ -16,22 +15,19 @@ from lic_drake.evaluate.table import Table, rate_cells
 from lic_drake.evaluate.trials import TrialTable
 
 BASELINES = ("rnd", "cost")
-"""The paper's strategies that learn nothing."""
+"""The paper's baseline strategies."""
 LEARNED = ("gp", "knn")
-"""The paper's strategies that learn, by their estimators."""
+"""The paper's LIC strategies, by estimator."""
 METHODS = (*BASELINES, *LEARNED)
-"""The paper's strategies in the order of its tables."""
+"""All strategies of the paper, in the order of its tables."""
 
 _PARTS = ("1st attempt", "2nd attempt", "total")
 
 
 def success_table(trials: TrialTable, paper: PaperTable) -> Table:
-    """Returns Table I, III or IV: first attempts, second ones where those failed, and totals.
+    """Returns Table I, III or IV: first attempts, second ones after failures, and totals.
 
-    Args:
-        trials: Trials of two attempts or more in the category of the paper's table; strategies
-            that were not tried are left out.
-        paper: The paper's table.
+    Strategies without trials are left out.
 
     Raises:
         LibraryError: The trials are incomplete.
@@ -75,10 +71,7 @@ def success_table(trials: TrialTable, paper: PaperTable) -> Table:
 
 
 def t_test_table(trials: TrialTable) -> Table:
-    """Returns Table II: tests between strategies on the totals of two attempts.
-
-    Args:
-        trials: Trials in cylinder-clutter.
+    """Returns Table II: tests between strategies in cylinder-clutter, on totals of two attempts.
 
     Raises:
         LibraryError: A strategy is missing, or trials are incomplete.
@@ -87,16 +80,8 @@ def t_test_table(trials: TrialTable) -> Table:
     for (a, b), theirs in TABLE_II.items():
         won_a, won_b = trials.success(a, 2), trials.success(b, 2)
         ours = two_sample_t_test(count(won_a), count(won_b))
-        rows.append(
-            (
-                f"{label(a)}, {label(b)}",
-                _format_t(ours),
-                _format_p(ours.p, 4),
-                _format_t(theirs),
-                _format_p(theirs.p, 4),
-                _format_p(mcnemar(won_a, won_b)),
-            )
-        )
+        tests = (cell for test in (ours, theirs) for cell in _test_cells(test))
+        rows.append((f"{label(a)}, {label(b)}", *tests, _format_p(mcnemar(won_a, won_b))))
     return Table(
         caption="Table II. Tests between strategies in cylinder-clutter, on the totals of two"
         " attempts: unpaired two-sample t with pooled variance, as in the paper, and McNemar's"
@@ -108,11 +93,7 @@ def t_test_table(trials: TrialTable) -> Table:
 
 
 def margins_table(trials: TrialTable, paper: PaperTable) -> Table:
-    """Returns by how many points LIC is better than RND and COST, and the paper's LIC was.
-
-    Args:
-        trials: Trials of two attempts or more in the category of the paper's table.
-        paper: The paper's table.
+    """Returns the margins of LIC over the baselines, in percentage points, ours and the paper's.
 
     Raises:
         LibraryError: The trials are incomplete.
@@ -121,15 +102,20 @@ def margins_table(trials: TrialTable, paper: PaperTable) -> Table:
     for part, attempts in (("1st attempt", 1), ("total", 2)):
         for method in _tried(trials, LEARNED):
             for other in _tried(trials, BASELINES):
-                ours = paired_difference(
-                    trials.success(method, attempts), trials.success(other, attempts)
+                value, low, high = (
+                    100.0 * item
+                    for item in paired_difference(
+                        trials.success(method, attempts), trials.success(other, attempts)
+                    )
                 )
+                a, b = (_part(paper.columns.get(name), part) for name in (method, other))
                 rows.append(
                     (
                         part,
                         f"{label(method)} - {label(other)}",
-                        *_points(ours),
-                        _paper_margin(paper, method, other, part),
+                        f"{value:+.2f}",
+                        f"{low:+.1f}..{high:+.1f}",
+                        f"{100.0 * (a.rate - b.rate):+.2f}" if a and b else "-",
                         _p_against(trials, method, other, part),
                     )
                 )
@@ -159,16 +145,11 @@ def _part(column: PaperColumn | None, part: str) -> Count | None:
 
 def _p_against(trials: TrialTable, method: str, other: str, part: str) -> str:
     """Formats McNemar's p against a strategy to the left; second attempts are not paired."""
-    to_the_left = METHODS.index(other) < METHODS.index(method)
-    if part == "2nd attempt" or other not in trials.methods() or not to_the_left:
+    is_left = METHODS.index(other) < METHODS.index(method)
+    if part == "2nd attempt" or other not in trials.methods() or not is_left:
         return ""
     attempts = 1 if part == "1st attempt" else 2
     return _format_p(mcnemar(trials.success(method, attempts), trials.success(other, attempts)))
-
-
-def _paper_margin(paper: PaperTable, method: str, other: str, part: str) -> str:
-    a, b = (_part(paper.columns.get(name), part) for name in (method, other))
-    return f"{100.0 * (a.rate - b.rate):+.2f}" if a and b else "-"
 
 
 def _cells(result: Count) -> tuple[str, str]:
@@ -176,13 +157,8 @@ def _cells(result: Count) -> tuple[str, str]:
     return f"{rate} ({counts})", interval
 
 
-def _points(difference: Difference) -> tuple[str, str]:
-    value, low, high = (100.0 * item for item in difference)
-    return f"{value:+.2f}", f"{low:+.1f}..{high:+.1f}"
-
-
-def _format_t(result: TTest) -> str:
-    return f"t({result.df}) = {result.t:.3f}"
+def _test_cells(result: TTest) -> tuple[str, str]:
+    return f"t({result.df}) = {result.t:.3f}", _format_p(result.p, 4)
 
 
 def _format_p(p: float, digits: int = 2) -> str:

@@ -46,17 +46,20 @@ def run_trial(
         environment: Its index.
         p_WG: Goal, shape (3,), metres.
         attempts: Maximum number of reaches.
-        fresh: Whether every attempt finds the environment as it was drawn; otherwise it finds it
-            as the attempt before left it, as on a real robot.
+        fresh: Whether the environment is reset before every attempt; otherwise it stays as the
+            previous attempt left it, as on a real robot.
         moves: Whether a PR2 may move base and torso before a reach.
-        reach: Makes a request's reach.
-        look: Tells where the goal seems to be and which starts seem possible, before an attempt
-            with this number, from 0; by default both are known. With another goal an attempt
-            finds the environment as it was drawn.
+        reach: Simulates a request.
+        look: Returns the perceived goal and the starts believed feasible before the attempt with
+            this number, from 0; both are known by default. If the perceived goal has changed, the
+            environment is reset.
     """
     if look is None:
         known = make_starts(scenario, scenario.sample_instance(stream, environment), moves)
-        look = _knowing(p_WG, known)
+
+        def look(_: int) -> tuple[Vector, FeasibleStarts]:
+            return p_WG, known
+
     done: list[Attempt] = []
     for number in range(attempts):
         p_seen, starts = look(number)
@@ -72,22 +75,16 @@ def run_trial(
     return done
 
 
-def _knowing(
-    p_WG: Vector, starts: FeasibleStarts
-) -> Callable[[int], tuple[Vector, FeasibleStarts]]:
-    return lambda _: (p_WG, starts)
-
-
 def random_requests(
     scenario: Scenario, stream: str, environments: int, goals: int
 ) -> list[ReachRequest]:
     """Returns reaches from random starts of the grid to random goals: RND's first attempts.
 
     Args:
-        scenario: What to simulate.
+        scenario: The scenario.
         stream: Seed stream of environments, goals and starts.
         environments: Number of environments, from index 0.
-        goals: Number of goals in each; of starts to its goal where an environment offers one.
+        goals: Number of reaches in each, to as many goals unless the environment has one goal.
     """
     requests = []
     for environment in range(environments):

@@ -1,4 +1,4 @@
-"""Trials of an evaluation as one file, a row for each attempt, and questions to them."""
+"""The trials of an evaluation as one file with a row per attempt, and their success rates."""
 
 import dataclasses
 from collections.abc import Iterable, Sequence
@@ -15,7 +15,7 @@ from lic_drake.experience.files import readable_errors, write_atomically
 from lic_drake.experience.schema import opened, schema_of, write_table
 
 VERSION = 1
-"""Grows with every change of the columns."""
+"""Incremented with every change of the columns."""
 
 Pair = tuple[int, int]
 """Environment and goal of a trial."""
@@ -26,15 +26,14 @@ class TrialRow:
     """One attempt of a strategy at a goal.
 
     Attributes:
-        variant: How it was evaluated: "" where later attempts find the environment as the first
-            one left it; other words name ablations, for instance "fresh".
+        variant: "" for the standard evaluation; other names denote ablations, such as "fresh".
         method: Strategy, see `lic_drake.select.registry.method_names`.
         environment: Index of the environment in the evaluation's seed stream.
         goal: Index of the goal in the environment.
         attempt: Number of the attempt, from 1.
         key: Key of the reach in the library of reaches.
         success: Whether it reached the goal.
-        probability: Estimated success of the chosen start; NaN for strategies without an estimate.
+        probability: Estimated success probability of the selected start; NaN without an estimate.
         seconds: Wall time of the selection.
     """
 
@@ -56,10 +55,10 @@ _METADATA = {"lic_drake.trials_version": str(VERSION), "lic_drake.version": lic_
 
 
 def write_trials(path: Path, rows: Sequence[TrialRow]) -> None:
-    """Writes the rows as a Parquet file, making its folder if it is not there.
+    """Writes the rows as a Parquet file, atomically, creating its folder if needed.
 
     Raises:
-        LibraryError: The system refuses; an older file is as before.
+        LibraryError: The file cannot be written.
     """
     columns = {name: [getattr(row, name) for row in rows] for name in SCHEMA.names}
     table = pa.Table.from_pydict(columns, schema=SCHEMA.with_metadata(_METADATA))
@@ -69,37 +68,33 @@ def write_trials(path: Path, rows: Sequence[TrialRow]) -> None:
 
 
 def read_trials(path: Path) -> list[TrialRow]:
-    """Reads a file of trials; every float has the bits that it was written with.
+    """Reads a file of trials.
 
     Raises:
         LibraryError: The file is missing, damaged, of another kind or of another version.
     """
     with opened(path, "delete it and evaluate again") as file:
-        _check(path, file.schema_arrow)
+        schema = file.schema_arrow
+        version = (schema.metadata or {}).get(b"lic_drake.trials_version")
+        if version is None:
+            raise LibraryError(f"{path} holds no trials of lic_drake; choose another file")
+        if version != str(VERSION).encode() or not schema.equals(SCHEMA, check_metadata=False):
+            raise LibraryError(
+                f"{path} holds trials of version {quoted(version.decode(errors='replace'))} that"
+                f" this lic_drake {lic_drake.__version__} cannot read; evaluate again"
+            )
         table = file.read()
     return [TrialRow(**row) for row in table.to_pylist()]
 
 
-def _check(path: Path, schema: pa.Schema) -> None:
-    """Refuses files that are no trials or that this version cannot read."""
-    version = (schema.metadata or {}).get(b"lic_drake.trials_version")
-    if version is None:
-        raise LibraryError(f"{path} holds no trials of lic_drake; choose another file")
-    if version != str(VERSION).encode() or not schema.equals(SCHEMA, check_metadata=False):
-        raise LibraryError(
-            f"{path} holds trials of version {quoted(version.decode(errors='replace'))} that this"
-            f" lic_drake {lic_drake.__version__} cannot read; evaluate again"
-        )
-
-
 class TrialTable:
-    """Trials by variant and method, each a run of attempts that ends with its first success."""
+    """Trials by variant and method: sequences of attempts that end with the first success."""
 
     def __init__(self, rows: Iterable[TrialRow]) -> None:
-        """Sorts the attempts into trials.
+        """Groups attempts into trials.
 
         Raises:
-            LibraryError: A trial's attempts are not 1, 2, ... or go on after a success.
+            LibraryError: A trial's attempts are not 1, 2, ... or continue after a success.
         """
         ordered = sorted(rows, key=lambda row: (row.environment, row.goal, row.attempt))
         self._trials: dict[tuple[str, str], dict[Pair, tuple[TrialRow, ...]]] = {}
@@ -109,25 +104,25 @@ class TrialTable:
             if row.attempt != len(earlier) + 1 or any(other.success for other in earlier):
                 raise LibraryError(
                     f"attempt {row.attempt} of {_name(row.method, row.variant)} in environment"
-                    f" {row.environment} at goal {row.goal} is there twice, lacks the attempt"
-                    " before it, or comes after a success; evaluate again"
+                    f" {row.environment} at goal {row.goal} is a duplicate, has no predecessor, or"
+                    " follows a success; evaluate again"
                 )
             trials[row.environment, row.goal] = (*earlier, row)
 
     @property
     def variants(self) -> tuple[str, ...]:
-        """Names of the variants, sorted; the standard evaluation, "", comes first."""
+        """Names of the variants, sorted."""
         return tuple(sorted({variant for variant, _ in self._trials}))
 
     def methods(self, variant: str = "") -> tuple[str, ...]:
-        """Returns the strategies that were tried in a variant, sorted."""
+        """Returns the strategies of a variant, sorted."""
         return tuple(sorted(method for v, method in self._trials if v == variant))
 
     def pairs(self, variant: str = "") -> list[Pair]:
-        """Returns the environments and goals of a variant, sorted, the same for all its methods.
+        """Returns the environments and goals of a variant, sorted.
 
         Raises:
-            LibraryError: Methods were tried on different ones.
+            LibraryError: Its methods were tried on different ones.
         """
         tried = {method: set(self._trials[variant, method]) for method in self.methods(variant)}
         for method, pairs in tried.items():
@@ -135,9 +130,8 @@ class TrialTable:
             if pairs != others:
                 environment, goal = min(pairs ^ others)
                 raise LibraryError(
-                    f"{_name(other, variant)} and {method} were tried on different goals, for"
-                    f" instance goal {goal} of environment {environment}; evaluate all methods"
-                    " on the same ones"
+                    f"{_name(other, variant)} and {method} were tried on different goals, such as"
+                    f" goal {goal} of environment {environment}; evaluate them together"
                 )
         return sorted(set().union(*tried.values()))
 
@@ -153,19 +147,11 @@ class TrialTable:
         return self._trials[variant, method]
 
     def success(self, method: str, attempts: int, variant: str = "") -> NDArray[np.bool_]:
-        """Returns which trials reach the goal within their first attempts, shape (n,).
-
-        Args:
-            method: Strategy.
-            attempts: How many attempts count.
-            variant: How it was evaluated.
-
-        Returns:
-            One entry for each of `pairs(variant)`.
+        """Returns whether each of `pairs(variant)` succeeds within some attempts, shape (n,).
 
         Raises:
-            LibraryError: There are no such trials, or some gave up before that many attempts, or
-                methods were tried on different goals.
+            LibraryError: There are no such trials, some ended before that many attempts, or methods
+                were tried on different goals.
         """
         trials = self.trials(method, variant)
         for (environment, goal), rows in trials.items():
@@ -179,21 +165,13 @@ class TrialTable:
         )
 
     def conditional(self, method: str, attempt: int, variant: str = "") -> Count:
-        """Counts an attempt's successes among the trials in which all before it failed.
-
-        Raises:
-            LibraryError: As `success`.
-        """
+        """Counts an attempt's successes among the trials in which all earlier ones failed."""
         before = int(self.success(method, attempt - 1, variant).sum())
         after = self.success(method, attempt, variant)
         return Count(int(after.sum()) - before, len(after) - before)
 
     def max_attempts(self, method: str, variant: str = "") -> int:
-        """Returns the largest number of attempts that any of a method's trials took.
-
-        Raises:
-            LibraryError: There are no trials of the method.
-        """
+        """Returns the largest number of attempts in a method's trials."""
         return max(map(len, self.trials(method, variant).values()))
 
 

@@ -1,5 +1,4 @@
 from itertools import product
-from math import isnan
 
 import numpy as np
 import pytest
@@ -9,22 +8,12 @@ from scipy.stats import norm, ttest_ind
 
 from lic_drake.evaluate.statistics import (
     Count,
-    count,
     mcnemar,
     paired_difference,
     two_sample_t_test,
 )
-from lic_drake.intervals import wilson_interval
 
 outcomes = st.lists(st.tuples(st.booleans(), st.booleans()), min_size=1, max_size=12)
-
-
-def test_a_count_knows_its_rate_and_interval() -> None:
-    assert count(np.array([[True, False], [True, True]])) == (3, 4)
-    assert Count(3, 4).rate == 0.75
-    assert Count(3, 4).interval() == wilson_interval(3, 4)
-    assert Count(3, 4).interval(0.5) == wilson_interval(3, 4, 0.5)
-    assert isnan(Count(0, 0).rate)
 
 
 @given(outcomes)

@@ -4,7 +4,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
@@ -34,24 +33,6 @@ def test_rows_come_back_bit_for_bit_in_their_order(tmp_path: Path) -> None:
     assert [p.name for p in path.parent.iterdir()] == ["trials.parquet"]
 
 
-def test_the_file_is_compressed_and_opens_in_pandas(tmp_path: Path) -> None:
-    path = tmp_path / "trials.parquet"
-    write_trials(path, make_rows("gp", ["01"] * 2000))
-    frame = pd.read_parquet(path)
-    assert len(frame) == 4000
-    assert frame.success.mean() == 0.5
-    group = pq.ParquetFile(path).metadata.row_group(0)
-    columns = [group.column(i) for i in range(group.num_columns)]
-    assert {column.compression for column in columns} == {"ZSTD"}
-    # The keys alone carry 8 bytes each.
-    assert path.stat().st_size < 4000 * 16
-
-
-def test_no_trials_are_a_file_too(tmp_path: Path) -> None:
-    write_trials(tmp_path / "trials.parquet", [])
-    assert read_trials(tmp_path / "trials.parquet") == []
-
-
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(LibraryError, match=r"cannot read .*none\.parquet: No such file"):
         read_trials(tmp_path / "none.parquet")
@@ -63,16 +44,6 @@ def test_a_file_cut_short_is_damaged(tmp_path: Path, keep: int) -> None:
     write_trials(path, ROWS)
     path.write_bytes(path.read_bytes()[:keep])
     with pytest.raises(LibraryError, match="damaged or not a Parquet file; delete it"):
-        read_trials(path)
-
-
-def test_a_flipped_bit_is_found(tmp_path: Path) -> None:
-    path = tmp_path / "trials.parquet"
-    write_trials(path, make_rows("gp", ["01"] * 200))
-    content = bytearray(path.read_bytes())
-    content[len(content) // 4] ^= 1
-    path.write_bytes(content)
-    with pytest.raises(LibraryError, match="damaged"):
         read_trials(path)
 
 
