@@ -1,9 +1,10 @@
-"""`collect`: fills a library with every goal times every start, in some environments (paper IV-A).
+"""`collect`: simulates every goal from every start in a number of environments (paper IV-A).
 
-What a library is to hold, a `CollectionRequest`, is kept beside its shards as a small YAML file,
-so that a collection can go on, and grow, without being told again.
+The request is stored beside the shards as a YAML file, so that a collection can be resumed or
+extended without repeating its options.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -30,23 +31,23 @@ from lic_drake.starts import training_starts
 from lic_drake.types import Vector
 
 REQUEST_FILE = "_collection.yaml"
-"""Name of the request's file in a library; the underscore hides it from Parquet readers."""
+"""File name of the request in a library; the underscore hides it from Parquet readers."""
 
 MAX_ENVIRONMENTS = 1_000_000
-"""More environments than this in one library are refused as a slip of the keyboard."""
+"""Larger numbers of environments are rejected as typing errors."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CollectionRequest:
-    """All goals times all starts of a scenario's task, in some environments of a seed stream.
+    """Every goal from every start of a scenario's task, in some environments of a seed stream.
 
     Attributes:
-        scenario: The scenario; its task gives the grids of goals and starts.
+        scenario: Defines the grids of goals and starts.
         stream: Seed stream of the environments.
         first_environment: Index of the first environment in its stream.
         environments: Number of environments.
-        max_goals: Use at most this many goals of the grid, evenly thinned; None: all.
-        max_starts: Use at most this many starts of the grid, evenly thinned; None: all.
+        max_goals: Subsample the goal grid evenly to at most this many; None: all.
+        max_starts: Subsample the start grid evenly to at most this many; None: all.
 
     Raises:
         RequestError: A value is out of its range.
@@ -62,18 +63,15 @@ class CollectionRequest:
     def __post_init__(self) -> None:
         if self.stream not in STREAMS:
             raise RequestError(f"unknown stream {self.stream!r}; choose one of {list(STREAMS)}")
-        if not 0 <= self.first_environment < 2**31:
-            raise RequestError(
-                f"the first environment must be from 0 to 2^31 - 1, got {self.first_environment}"
-            )
-        if not 1 <= self.environments <= MAX_ENVIRONMENTS:
-            raise RequestError(
-                f"environments must be from 1 to {MAX_ENVIRONMENTS}, got {self.environments}"
-            )
-        for name in ("max_goals", "max_starts"):
+        for name, low, high in (
+            ("first_environment", 0, 2**31 - 1),
+            ("environments", 1, MAX_ENVIRONMENTS),
+            ("max_goals", 1, math.inf),
+            ("max_starts", 1, math.inf),
+        ):
             value = getattr(self, name)
-            if value is not None and value < 1:
-                raise RequestError(f"{name} must be 1 or more, got {value}")
+            if value is not None and not low <= value <= high:
+                raise RequestError(f"{name} must be from {low} to {high}, got {value}")
 
     @property
     def environment_indices(self) -> range:
@@ -81,36 +79,32 @@ class CollectionRequest:
         return range(self.first_environment, self.first_environment + self.environments)
 
     def goals(self, environment: int | None = None) -> Vector:
-        """Returns the goals p_WG in an environment, shape (n, 3), metres; n is the same in all.
+        """Returns the goals p_WG in an environment (by default the first), shape (n, 3), metres.
 
-        Args:
-            environment: Its index in the stream; the first one by default.
+        n is the same in all environments.
         """
         index = self.first_environment if environment is None else environment
-        return _thin(self.scenario.goals(self.stream, index), self.max_goals)
+        return _subsample(self.scenario.goals(self.stream, index), self.max_goals)
 
     def starts(self, environment: int | None = None) -> Starts:
-        """Returns the m initial conditions in an environment.
+        """Returns the m initial conditions in an environment, by default the first.
 
-        m is the same in all but where base and torso of a robot are not.
-
-        Args:
-            environment: Its index in the stream; the first one by default.
+        m is the same in all environments if base and torso of the robot are fixed.
 
         Raises:
-            RequestError: The arm can take no start pose.
+            RequestError: No start pose is reachable.
         """
         index = self.first_environment if environment is None else environment
         starts = training_starts(self.scenario, self.stream, index)
         if len(starts) == 0:
             raise RequestError(
-                f"{self.scenario.robot} can take no pose of the start line's grid;"
+                f"{self.scenario.robot} can reach no pose of the start line's grid;"
                 " change task.start_line in the scenario"
             )
-        return starts.take(_thin(np.arange(len(starts)), self.max_starts))
+        return starts.take(_subsample(np.arange(len(starts)), self.max_starts))
 
     def reaches(self, environment: int) -> list[ReachRequest]:
-        """Returns the reaches into one environment; the starts vary fastest."""
+        """Returns the reaches in one environment; starts vary fastest."""
         starts = self.starts(environment)
         return [
             ReachRequest(self.scenario, self.stream, environment, p_WG, start)
@@ -140,24 +134,22 @@ def collect(
     reach: ReachFunction = run_reach,
     progress: ProgressFunction = lambda progress: None,
 ) -> Progress:
-    """Simulates the reaches of a request that are not yet in a library; see `simulate`.
+    """Simulates the reaches of a request that a library lacks; see `simulate` for the errors.
 
     Args:
-        library: A folder; made if absent.
-        request: What the library is to hold. A library that was begun before takes only the same
-            request, or one with more environments.
+        library: A folder; created if absent.
+        request: What the library should hold. An existing library accepts only its own request, or
+            that with more environments.
         workers: Where to simulate; by default in this process.
-        share: The share of the environments to simulate.
+        share: Part of the environments to simulate.
         reach: Simulates a request.
-        progress: Shows how far the collection is.
+        progress: Called during the run.
 
     Raises:
-        LibraryError: The library belongs to another request, or as in `simulate`.
-        ClusterError: As in `simulate`.
-        KeyboardInterrupt: As in `simulate`.
+        LibraryError: The library belongs to another request.
     """
     library.create()
-    # Shares of one collection begin at the same time.
+    # All shares of a job array may start at the same time.
     with library.locked(share), FileLock(library.path / "_collection.lock"):
         _record_request(library, request)
     return simulate(
@@ -172,13 +164,21 @@ def collect(
 
 
 def _record_request(library: ExperienceLibrary, request: CollectionRequest) -> None:
-    """Writes the request into the library, unless that was begun with another one."""
+    """Stores a request in a library unless that belongs to a different one."""
     path = library.path / REQUEST_FILE
     if path.exists():
-        stored = read_request(path)
-        _refuse_unless_continuing(request, stored, library.path)
-        if stored.environments == request.environments:
+        ours, theirs = _values(request), _values(read_request(path))
+        if request.environments > theirs["environments"]:
+            theirs["environments"] = request.environments
+        elif ours == theirs:
             return
+        if different := [
+            f"{k} {theirs[k]} instead of {ours[k]}" for k in ours if theirs[k] != ours[k]
+        ]:
+            raise LibraryError(
+                f"{library.path} was begun with {', '.join(different)}; resume with the same"
+                " options (or none), or use another folder"
+            )
     if library.shard_paths() and library.header().scenario_digest != request.scenario.digest:
         raise LibraryError(
             f"{library.path} holds reaches of scenario {library.header().scenario_digest}, not of"
@@ -187,27 +187,8 @@ def _record_request(library: ExperienceLibrary, request: CollectionRequest) -> N
     write_request(request, path)
 
 
-def _refuse_unless_continuing(
-    request: CollectionRequest, stored: CollectionRequest, path: Path
-) -> None:
-    """Refuses a request that differs from a library's own in more than more environments."""
-    ours, theirs = _values(request), _values(stored)
-    differences = [
-        f"{name} {theirs[name]} instead of {ours[name]}"
-        for name in ours
-        if name != "environments" and theirs[name] != ours[name]
-    ]
-    if request.environments < stored.environments:
-        differences.append(f"{stored.environments} environments, not {request.environments}")
-    if differences:
-        raise LibraryError(
-            f"{path} was begun with {', '.join(differences)}; give the same options (or none) to"
-            " go on, or another folder"
-        )
-
-
 def write_request(request: CollectionRequest, path: Path) -> None:
-    """Writes a request as YAML, with every value of its scenario.
+    """Writes a request as YAML, including the whole scenario.
 
     Raises:
         LibraryError: The file cannot be written.
@@ -215,7 +196,7 @@ def write_request(request: CollectionRequest, path: Path) -> None:
     data = {**_values(request), "scenario": yaml.safe_load(scenario_text(request.scenario))}
     content = "# What `lic collect` puts into this folder; seeds and values are complete.\n"
     content += yaml.safe_dump(data, sort_keys=False)
-    write_atomically(path, lambda temporary: _write_text(temporary, content))
+    write_atomically(path, lambda temporary: temporary.write_text(content, encoding="utf-8"))
 
 
 def read_request(path: Path) -> CollectionRequest:
@@ -223,8 +204,8 @@ def read_request(path: Path) -> CollectionRequest:
 
     Raises:
         LibraryError: The file cannot be read or is not a request.
-        RequestError: A value is out of its range.
-        ScenarioError: Its scenario is not one that this lic_drake knows.
+        RequestError: A value is out of range.
+        ScenarioError: This lic_drake does not know the scenario's category or parameters.
     """
     with readable_errors(path, "read"):
         content = path.read_bytes()
@@ -232,7 +213,9 @@ def read_request(path: Path) -> CollectionRequest:
         data = read_mapping(content, str(path))
     except ScenarioError:
         data = {}
-    if not _is_request(data):
+    types: dict[str, Any] = {item.name: item.type for item in fields(CollectionRequest)}
+    types |= {"scenario": dict, "scenario_digest": str}
+    if set(data) != set(types) or not all(isinstance(data[k], t) for k, t in types.items()):
         raise LibraryError(
             f"{path} is not a collection request; restore it, or delete it and run lic collect"
             " with the library's options"
@@ -241,14 +224,14 @@ def read_request(path: Path) -> CollectionRequest:
     scenario = parse_scenario(yaml.safe_dump(data.pop("scenario")), source=str(path))
     if scenario.digest != digest:
         raise LibraryError(
-            f"{path}: its scenario has digest {scenario.digest}, the library was begun with"
-            f" {digest}: the file was edited or another lic_drake wrote it; use another folder"
+            f"{path}: its scenario has digest {scenario.digest}, but the library was begun with"
+            f" {digest}: it was edited or another lic_drake wrote it; use another folder"
         )
     return CollectionRequest(scenario=scenario, **data)
 
 
 def _values(request: CollectionRequest) -> dict[str, Any]:
-    """Returns a request as plain values, its scenario as digest."""
+    """Returns a request as plain values, the scenario as its digest."""
     names = [item.name for item in fields(request) if item.name != "scenario"]
     return {
         "scenario_digest": request.scenario.digest,
@@ -256,26 +239,8 @@ def _values(request: CollectionRequest) -> dict[str, Any]:
     }
 
 
-def _is_request(data: dict[Any, Any]) -> bool:
-    """Returns whether parsed YAML has exactly the keys of a request with values of their types."""
-    types: dict[str, tuple[type, ...]] = {
-        "scenario_digest": (str,),
-        "stream": (str,),
-        "first_environment": (int,),
-        "environments": (int,),
-        "max_goals": (int, type(None)),
-        "max_starts": (int, type(None)),
-        "scenario": (dict,),
-    }
-    return set(data) == set(types) and all(type(data[key]) in types[key] for key in types)
-
-
-def _write_text(path: Path, content: str) -> None:
-    path.write_text(content, encoding="utf-8")
-
-
-def _thin[T: np.generic](grid: NDArray[T], count: int | None) -> NDArray[T]:
-    """Returns `count` rows from the middles of equal parts of a grid, or all of it."""
+def _subsample[T: np.generic](grid: NDArray[T], count: int | None) -> NDArray[T]:
+    """Returns at most `count` rows: the middles of as many equal parts of a grid."""
     if count is None or count >= len(grid):
         return grid
     middles = ((np.arange(count) + 0.5) * len(grid) / count).astype(int)

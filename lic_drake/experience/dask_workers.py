@@ -1,4 +1,4 @@
-"""`DaskWorkers`: the workers of a Dask scheduler. Needs the extra `cluster`."""
+"""`DaskWorkers`: the workers of a Dask scheduler. Requires the extra `cluster`."""
 
 import asyncio
 import logging
@@ -12,18 +12,17 @@ from typing import Any, Self
 from lic_drake.errors import ClusterError
 
 CONNECT_S = 5.0
-"""A scheduler that does not answer within this time is not there, seconds."""
+"""Timeout for connecting to a scheduler, seconds."""
 
 LOOK_S = 1.0
-"""Wall time between two looks at the list of workers, seconds."""
+"""Interval between updates of the list of workers, seconds."""
 
 
 class DaskWorkers:
     """The workers of a Dask scheduler, as a context manager.
 
-    Each is a process with one thread, because a Drake diagram belongs to one thread, and works on
-    one task at a time. Workers that join later are used, too. A task whose worker dies is repeated
-    by Dask itself, as often as its configuration allows (`allowed-failures`).
+    Each must be a process with one thread, because Drake diagrams are not thread-safe. Workers may
+    join later. Dask itself repeats a task whose worker died, up to `allowed-failures` times.
     """
 
     def __init__(self, address: str, most: int | None = None) -> None:
@@ -31,7 +30,7 @@ class DaskWorkers:
 
         Args:
             address: Its address, for instance tcp://node1:8786.
-            most: Use at most this many workers; by default all.
+            most: Maximum number of workers to use; by default all.
 
         Raises:
             ClusterError: Dask is not installed, or no scheduler answers.
@@ -44,19 +43,19 @@ class DaskWorkers:
             ) from None
         self._address, self._most = address, most
         self._count, self._next_look = 0, 0.0
-        # Dask tells the log what becomes an exception here anyway.
+        # Dask also logs the errors that are raised as exceptions here.
         for name in ("distributed", "distributed.client"):
             logging.getLogger(name).setLevel(logging.CRITICAL)
         try:
-            # A client that cannot connect would linger and complain when it is collected. In a
-            # thread, because a notebook has an event loop in this one.
+            # Probe first: a client that cannot connect complains when it is garbage-collected. In
+            # a thread, because a notebook runs an event loop in this one.
             with ThreadPoolExecutor(max_workers=1) as thread:
                 found = thread.submit(asyncio.run, _identify(address)).result()
             if found != "Scheduler":
                 raise ValueError(f"found a {found}")
             self._client = Client(address, timeout=CONNECT_S, set_as_default=False)
         except (OSError, ValueError) as error:
-            reason = str(error) or f"silence for {CONNECT_S:g} s"
+            reason = str(error) or f"timeout after {CONNECT_S:g} s"
             raise ClusterError(
                 f"no Dask scheduler answers at {address!r} ({reason}); start one with: dask"
                 " scheduler, which prints its address"
@@ -66,13 +65,13 @@ class DaskWorkers:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        self._client.close(timeout=CONNECT_S)  # Scheduler and workers go on.
+        self._client.close(timeout=CONNECT_S)  # Scheduler and workers keep running.
 
     def capacity(self) -> int:
-        """Returns the present number of workers, at most a second old.
+        """Returns the number of workers, updated once a second.
 
         Raises:
-            ClusterError: A worker has several threads, or the scheduler is gone.
+            ClusterError: A worker has several threads, or the connection is lost.
         """
         if time.monotonic() >= self._next_look:
             try:
@@ -91,9 +90,9 @@ class DaskWorkers:
         return self._count
 
     def submit[T](self, work: Callable[..., T], /, *args: Any) -> Future[T]:
-        """Sends a call to a worker."""
+        """Calls the function in a worker."""
         ours: Future[T] = Future()
-        # Bytes: the scheduler would unpickle anything else, and need all that a worker needs.
+        # As bytes, which the scheduler need not unpickle: it may lack the workers' packages.
         message = pickle.dumps((work, args))
         theirs = self._client.submit(_call, message, pure=False)
         theirs.add_done_callback(partial(self._pass_on, ours))
@@ -101,10 +100,10 @@ class DaskWorkers:
         return ours
 
     def restart(self) -> None:
-        """Does nothing: nannies start workers again."""
+        """Does nothing: nannies restart workers."""
 
     def _pass_on[T](self, ours: Future[T], theirs: Any) -> None:
-        """Hands the end of a task over, in the terms of this project."""
+        """Passes the result or error of a Dask future on to ours."""
         from distributed import KilledWorker
 
         if ours.cancelled():
@@ -134,6 +133,6 @@ async def _identify(address: str) -> str:
 
 
 def _call(message: bytes) -> Any:
-    """Runs in a worker: makes the call that `submit` was asked for."""
+    """Runs in a worker: calls the pickled function."""
     work, args = pickle.loads(message)
     return work(*args)

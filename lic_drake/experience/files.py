@@ -1,4 +1,4 @@
-"""Files that are either whole or absent, and system errors as one clear line."""
+"""Atomic file writes, and system errors as one clear line."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -10,11 +10,11 @@ from lic_drake.errors import LibraryError
 
 @contextmanager
 def readable_errors(path: Path, action: str) -> Iterator[None]:
-    """Turns system errors (no permission, disk full) into a `LibraryError` about a file.
+    """Turns system errors (no permission, disk full) into a `LibraryError`.
 
     Args:
-        path: The file or folder that the block works on.
-        action: What the block does, for instance "write".
+        path: The file or folder concerned.
+        action: What the block does to it, for instance "write".
     """
     try:
         yield
@@ -25,10 +25,10 @@ def readable_errors(path: Path, action: str) -> Iterator[None]:
 
 
 def check_writable(folder: Path) -> None:
-    """Makes a folder and sees that files can be written there, before any work starts.
+    """Creates a folder and checks that it is writable, before any work starts.
 
     Raises:
-        LibraryError: The system refuses.
+        LibraryError: It is not.
     """
     with readable_errors(folder, "write into"):
         folder.mkdir(parents=True, exist_ok=True)
@@ -37,17 +37,17 @@ def check_writable(folder: Path) -> None:
         probe.unlink()
 
 
-def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
-    """Writes a file so that readers see the old one, or the new one, and never half of it.
+def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
+    """Writes a file so that readers see either the old or the new one, never a part.
 
     Args:
-        path: The file; its folder must exist.
+        path: The file, in an existing folder.
         write: Writes the content to the path that it is given.
 
     Raises:
-        LibraryError: The system refuses; the folder is as before.
+        LibraryError: Writing failed; the folder is unchanged.
     """
-    # A fixed name: what a killed writer left behind is overwritten by the next one. Parquet
+    # The name is fixed so that the next writer overwrites what a killed one left behind. Parquet
     # readers skip names that begin with a dot or an underscore.
     temporary = path.with_name(f".{path.name}.tmp")
     with readable_errors(path, "write"):
@@ -62,7 +62,7 @@ def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
 
 
 def _sync(path: Path) -> None:
-    """Waits until a file or a folder's list of files is on the disk."""
+    """Flushes a file or directory entry to disk."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)

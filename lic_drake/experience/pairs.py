@@ -1,4 +1,4 @@
-"""The library D2 of second reaches (paper III-C): from single reaches, or from real second ones."""
+"""The library D2 of second reaches (paper III-C), built from single or actual second reaches."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -9,23 +9,13 @@ from numpy.typing import NDArray
 from lic_drake.errors import LibraryError
 
 SHOWN = (
-    "start_x",
-    "start_y",
-    "start_phi",
-    "final_x",
-    "final_y",
-    "final_phi",
-    "final_vx",
-    "final_vy",
-    "start_z",
-    "start_qx",
-    "final_z",
-    "final_vz",
+    *("start_x", "start_y", "start_phi", "final_x", "final_y", "final_phi", "final_vx", "final_vy"),
+    *("start_z", "start_qx", "final_z", "final_vz"),
 )
-"""Columns of a reach that a robot knows when it has failed: x0', x_inf' and the final velocity."""
+"""Columns that a robot can observe of a failed reach: x0', x_inf' and the final velocity."""
 
 FIRST_PREFIX = "first_"
-"""What the names of these columns begin with where they belong to the first reach of a pair."""
+"""Prefix of these columns for the first reach of a pair."""
 
 _SAME_TASK = ("stream", "environment", "goal_x", "goal_y", "goal_z")
 
@@ -34,31 +24,31 @@ _IN_SPACE = (
     *("start_x", "start_y", "start_z", "start_qw", "start_qx", "start_qy", "start_qz"),
     *("base_x", "base_y", "torso"),
 )
-"""Numbers for each earlier reach in a record's `after`: its start pose and what carried the arm."""
+"""Columns that each earlier reach in a record's `after` consists of: start pose and base."""
 
 
 def pair_reaches(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Returns D2: each failed reach followed by each reach of its environment and goal.
+    """Returns D2: each failed reach paired with every reach of the same environment and goal.
 
-    The paper assumes that a reach leaves its environment as it was, so that a failed reach and any
-    reach to the same goal in the same environment are a first and a second attempt. It draws the
-    second reach "from all of the reach attempts, whether they resulted in failure or not" and uses
-    all pairs instead of drawing; so a reach also follows itself, and fails again. A reach that
-    never began (its final pose is NaN) showed nothing, and is the first of no pair.
+    The paper assumes that a reach leaves its environment unchanged, so that a failed reach and any
+    reach to the same goal in the same environment form a first and a second attempt. The second
+    reach is "from all of the reach attempts, whether they resulted in failure or not"; all pairs
+    are used, including that of a failed reach with itself. A reach that never began (its final
+    pose is NaN) is the first of no pair.
 
     Args:
-        columns: D1: arrays of equal length named as the fields of `ReachRecord`.
+        columns: D1: arrays of shape (n,) named as the fields of `ReachRecord`.
 
     Returns:
-        The columns of the second reach, and of the first those of `SHOWN`, with `FIRST_PREFIX`
-        before their names. The pairs of a first reach stand together, in the order of D1.
+        The columns of the second reach, and those of `SHOWN` of the first, with `FIRST_PREFIX`.
+        Pairs are grouped by first reach, in the order of D1.
 
     Raises:
         LibraryError: A column is missing.
     """
     missing = [name for name in (*_SAME_TASK, *SHOWN, "success") if name not in columns]
     if missing:
-        raise LibraryError(f"the library has no column {missing[0]!r}, which D2 is made from")
+        raise LibraryError(f"the library has no column {missing[0]!r}, which D2 requires")
     task = _task_of_each(columns)
     members = np.argsort(task, kind="stable")
     num_members = np.bincount(task)
@@ -74,17 +64,17 @@ def pair_reaches(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]
 
 
 def pair_second_attempts(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Returns D2 from second attempts that were made: the paper's "straightforward approach".
+    """Returns D2 from actual second attempts: the paper's "straightforward approach".
 
     Args:
-        columns: Columns of a library that holds second attempts, whose `after` has one reach, and
-            the first attempts that they came after.
+        columns: Columns of a library of first and second attempts; `after` of the latter has one
+            reach.
 
     Returns:
         As `pair_reaches`, in the library's order.
 
     Raises:
-        LibraryError: There is no second attempt, or one without the first attempt before it.
+        LibraryError: There are no second attempts, or the first attempt of one is missing.
     """
     lengths = np.array([len(after) for after in columns["after"]], dtype=int)
     in_space = np.any(columns.get("start_qw", np.zeros(1)) != 0.0)
@@ -95,7 +85,7 @@ def pair_second_attempts(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArr
     }
     second = np.flatnonzero(lengths == len(start))
     if len(second) == 0:
-        raise LibraryError("the library holds no second attempts; give one that does")
+        raise LibraryError("the library holds no second attempts; use one that does")
     try:
         first = [
             first_of[(*(columns[n][i] for n in _SAME_TASK), *map(float, columns["after"][i]))]
@@ -116,7 +106,7 @@ def _joined(
 
 
 def _task_of_each(columns: Mapping[str, NDArray[Any]]) -> NDArray[np.intp]:
-    """Returns a number for each row that rows of the same environment and goal share."""
+    """Returns an index of each row's environment and goal, shape (n,)."""
     codes = [np.unique(columns[name], return_inverse=True)[1] for name in _SAME_TASK]
     _, task = np.unique(np.column_stack(codes), axis=0, return_inverse=True)
     return task.ravel()

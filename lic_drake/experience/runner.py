@@ -1,14 +1,14 @@
-"""`simulate`: simulates the requests that a library lacks; one environment is one task, one shard.
+"""`simulate`: simulates the requests that a library lacks; each environment is a task and a shard.
 
-A shard is written as a whole by this process when its task has ended. What Ctrl-C, a full disk or
-a kill may cost is therefore the environments under way; to resume is to ask for the same requests.
+This process writes each shard atomically once its task has finished, so Ctrl-C, a full disk or a
+kill loses only the environments in progress. Running the same requests again resumes.
 """
 
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import groupby
 from types import MappingProxyType
 from typing import Any
@@ -26,15 +26,15 @@ ReachFunction = Callable[[ReachRequest], ReachRecord]
 """Simulates a request; a top-level function, so that worker processes can import it."""
 
 POLL_S = 0.5
-"""Time between two reports of progress, seconds."""
+"""Interval between progress reports, seconds."""
 
 TRIES = 3
-"""A task during which a worker died so many times is given up, the last time on its own."""
+"""A task is abandoned when workers died during this many runs of it; the last one is solitary."""
 
 
 @dataclass(frozen=True)
 class Task:
-    """A call to make in a worker: its name, for instance that of its shard, and its arguments."""
+    """The arguments of a call in a worker, with a unique name such as that of its shard."""
 
     name: str
     arguments: tuple[Any, ...]
@@ -42,33 +42,33 @@ class Task:
 
 @dataclass(frozen=True, kw_only=True)
 class Progress:
-    """A run at one moment, or at its end.
+    """State of a run.
 
     Attributes:
-        total: Number of reaches that were asked for.
-        present: How many of them were in the library before this run.
-        done: How many are there now.
-        successes: How many of those reached their goal.
-        at_work: Number of environments that are being simulated.
+        total: Number of requested reaches.
+        present: How many of them the library held before this run.
+        done: How many it holds now.
+        successes: How many of those succeeded.
+        at_work: Number of environments in progress.
         elapsed_s: Wall time of this run, seconds.
-        failed: Names of the environments that were left out at the end, and why, in a line.
+        failed: Environments that were abandoned, by name, with the reason in one line.
     """
 
     total: int
-    present: int
-    done: int
-    successes: int
-    at_work: int
-    elapsed_s: float
-    failed: Mapping[str, str]
+    present: int = 0
+    done: int = 0
+    successes: int = 0
+    at_work: int = 0
+    elapsed_s: float = 0.0
+    failed: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def reaches_per_minute(self) -> float:
-        """Rate of this run; 0 before its first shard."""
+        """Throughput of this run; 0 before the first shard."""
         return 60.0 * (self.done - self.present) / self.elapsed_s if self.elapsed_s > 0 else 0.0
 
     def describe(self) -> str:
-        """Returns one line for people."""
+        """Returns a one-line progress message."""
         rate, clock = self.reaches_per_minute, "?"
         if rate > 0:
             left_min = int((self.total - self.done) / rate)
@@ -80,15 +80,15 @@ class Progress:
 
 
 ProgressFunction = Callable[[Progress], None]
-"""Is called about twice a second during a run, and at its end."""
+"""Called about twice a second during a run and at its end."""
 
 
 def refuse_failed(failed: Mapping[str, str]) -> None:
-    """Raises a `LibraryError` if tasks were left out; takes names and reasons."""
+    """Raises a `LibraryError` if tasks failed; takes their names and reasons."""
     for name, reason in failed.items():
         raise LibraryError(
-            f"{len(failed)} environments failed, for instance {name}: {reason}; run it again to"
-            " try them again"
+            f"{len(failed)} environments failed, for instance {name}: {reason}; run the same"
+            " command to retry them"
         )
 
 
@@ -102,118 +102,105 @@ def simulate(
     reach: ReachFunction = run_reach,
     progress: ProgressFunction = lambda progress: None,
 ) -> Progress:
-    """Simulates the requests that are not yet in a library.
+    """Simulates the requests that a library lacks.
 
-    The library does not depend on workers or interruptions (but for wall times).
+    Apart from wall times, the result depends neither on the workers nor on interruptions. Finished
+    shards are kept whatever is raised.
 
     Args:
-        requests: What to simulate, environment by environment; all of one scenario. They may be
-            generated on the way.
-        library: A folder; made if absent.
+        requests: Requests of one scenario, grouped by environment; may be a generator.
+        library: A folder; created if absent.
         workers: Where to simulate; by default in this process.
         total: Number of requests, for the progress; by default their length, if they have one.
-        share: Which share of a divided collection this is; others of the same division may be at
-            work on the same library, on other environments.
-        reach: Simulates one of them.
-        progress: Shows how far the run is.
+        share: Part of a collection that this run covers; see `ExperienceLibrary.locked`.
+        reach: Simulates a request.
+        progress: Called during the run.
 
     Returns:
-        The state at the end.
+        The final state.
 
     Raises:
-        LibraryError: The library is in use, holds a damaged file or another scenario, or cannot
-            be written; shards that were finished are kept.
-        ClusterError: The cluster cannot be used; as above.
-        KeyboardInterrupt: On Ctrl-C; as above.
+        LibraryError: The library is in use, contains a damaged file or another scenario, or is not
+            writable.
+        ClusterError: The cluster cannot be used.
+        KeyboardInterrupt: On Ctrl-C.
     """
     library.create()
-    with library.locked(share):
-        run = _Run(library, total or (len(requests) if isinstance(requests, Sized) else 0))
-        failed = run_tasks(
-            run.tasks(requests, reach),
-            simulate_environment,
-            workers or ThisProcess(),
-            run.finish,
-            lambda at_work: progress(run.progress(at_work)),
+    state = Progress(total=total or (len(requests) if isinstance(requests, Sized) else 0))
+    began_s = time.monotonic()
+
+    def count(successes: Iterable[bool], present: int = 0) -> None:
+        nonlocal state
+        new = list(successes)
+        state = replace(
+            state,
+            total=max(state.total, state.done + len(new)),
+            present=state.present + present,
+            done=state.done + len(new),
+            successes=state.successes + sum(new),
         )
-        return run.progress(at_work=0, failed=failed)
 
+    def current(at_work: int, failed: Mapping[str, str] = MappingProxyType({})) -> Progress:
+        elapsed_s = time.monotonic() - began_s
+        return replace(state, at_work=at_work, elapsed_s=elapsed_s, failed=failed)
 
-def simulate_environment(reach: ReachFunction, requests: list[ReachRequest]) -> list[ReachRecord]:
-    """Runs in a worker: simulates the reaches into one environment."""
-    return [reach(request) for request in requests]
-
-
-@dataclass
-class _Run:
-    """What is there and what has come."""
-
-    library: ExperienceLibrary
-    total: int
-    present: int = 0
-    done: int = 0
-    successes: int = 0
-    began_s: float = field(default_factory=time.monotonic)
-
-    def tasks(self, requests: Iterable[ReachRequest], reach: ReachFunction) -> Iterator[Task]:
-        """Yields a task for each environment that lacks reaches."""
-        held = self.library.successes()
+    def tasks() -> Iterator[Task]:
+        """Yields a task for each incomplete environment."""
+        held = library.successes()
         known = set(held)
         for environment, group in groupby(requests, lambda r: (r.stream, r.environment)):
             lacking: list[ReachRequest] = []
             for request in group:
-                key = request.key
-                if key in held:
-                    self.present += 1
-                    self.done += 1
-                    self.successes += held[key]
+                if (key := request.key) in held:
+                    count([held[key]], present=1)
                 elif key not in known:
                     lacking.append(request)
                 known.add(key)
             if lacking:
                 yield Task(shard_name(*environment), (reach, lacking))
 
-    def finish(self, task: Task, records: list[ReachRecord]) -> None:
+    def finish(task: Task, records: list[ReachRecord]) -> None:
         """Writes the shard of a task."""
-        requests: list[ReachRequest] = task.arguments[1]
+        asked: list[ReachRequest] = task.arguments[1]
         versions = {record.lic_drake_version for record in records}
-        if [r.key for r in records] != [r.key for r in requests] or versions != {
-            lic_drake.__version__
-        }:
+        same_keys = [record.key for record in records] == [request.key for request in asked]
+        if not same_keys or versions != {lic_drake.__version__}:
             raise ClusterError(
-                f"a worker simulated other reaches than those of {task.name}, with lic_drake"
+                f"a worker simulated different reaches from those of {task.name}, with lic_drake"
                 f" {', '.join(sorted(versions))}; install lic_drake {lic_drake.__version__} and the"
                 " same extensions on all workers"
             )
-        add_to_shard(self.library, task.name, records, requests[0].scenario)
-        self.done += len(records)
-        self.successes += sum(record.success for record in records)
+        add_to_shard(library, task.name, records, asked[0].scenario)
+        count(record.success for record in records)
 
-    def progress(self, at_work: int, failed: Mapping[str, str] = MappingProxyType({})) -> Progress:
-        """Returns the present state."""
-        return Progress(
-            total=max(self.total, self.done),
-            present=self.present,
-            done=self.done,
-            successes=self.successes,
-            at_work=at_work,
-            elapsed_s=time.monotonic() - self.began_s,
-            failed=failed,
+    with library.locked(share):
+        failed = run_tasks(
+            tasks(),
+            simulate_environment,
+            workers or ThisProcess(),
+            finish,
+            lambda at_work: progress(current(at_work)),
         )
+        return current(0, failed)
+
+
+def simulate_environment(reach: ReachFunction, requests: list[ReachRequest]) -> list[ReachRecord]:
+    """Runs in a worker: simulates the reaches in one environment."""
+    return [reach(request) for request in requests]
 
 
 def shard_name(stream: str, environment: int) -> str:
-    """Returns the name of an environment's shard."""
+    """Returns the shard name of an environment."""
     return f"{stream}-{environment:06d}"
 
 
 def add_to_shard(
     library: ExperienceLibrary, name: str, records: list[ReachRecord], scenario: Scenario
 ) -> None:
-    """Writes a shard anew with more records.
+    """Adds records to a shard, which is replaced atomically.
 
     Raises:
-        LibraryError: The old shard is damaged, or the system refuses.
+        LibraryError: The existing shard is damaged, or writing fails.
     """
     path = library.shard_path(name)
     old = to_records(read_shard(path)[1]) if path.exists() else []
@@ -229,23 +216,23 @@ def run_tasks[R](
     finish: Callable[[Task, R], None],
     report: Callable[[int], None] = lambda at_work: None,
 ) -> dict[str, str]:
-    """Calls `work` with each task's arguments in workers, and `finish` here as the calls end.
+    """Calls `work` with each task's arguments in workers, and `finish` in this process.
 
-    A call during which a worker process died is repeated: whoever was at work then, since it is
-    not known whose worker it was; the third time a task runs alone. What raises is left out.
+    When a worker process dies, all running calls are repeated, since the executor does not tell
+    which one was responsible; the third run of a task is solitary. Tasks that raise are abandoned.
 
     Args:
-        tasks: What to call; taken one by one as workers become free.
+        tasks: Drawn one by one as workers become free.
         work: A top-level function.
         workers: Where to call it.
-        finish: Takes a task and the result.
-        report: Is called with the number of running calls about twice a second.
+        finish: Receives each task and its result.
+        report: Called about twice a second with the number of running calls.
 
     Returns:
-        Names of the tasks that were left out, and why, in a line.
+        The abandoned tasks by name, with the reason in one line.
 
     Raises:
-        LicError: `finish` or `work` raised it; no other task would fare better.
+        LicError: Raised by `finish` or `work`; it would affect all other tasks, too.
     """
     new, again = iter(tasks), deque[Task]()
     running: dict[Future[R], Task] = {}
@@ -254,14 +241,14 @@ def run_tasks[R](
 
     def take() -> Task | None:
         if any(deaths[task.name] == TRIES - 1 for task in running.values()):
-            return None  # That one is alone.
+            return None  # Let that one run on its own.
         task = next(new, None)
         if task is None and again and (deaths[again[0].name] < TRIES - 1 or not running):
             return again.popleft()
         return task
 
     def conclude(future: Future[R]) -> bool:
-        """Takes a result; returns whether a worker died."""
+        """Processes a finished call; returns whether a worker died."""
         task = running.pop(future)
         try:
             finish(task, future.result())
@@ -285,7 +272,7 @@ def run_tasks[R](
                 running[workers.submit(work, *waiting.arguments)] = waiting
                 waiting = take()
             if not running:
-                time.sleep(POLL_S)  # There are no workers yet.
+                time.sleep(POLL_S)  # No workers yet.
             done = wait(running, POLL_S, FIRST_COMPLETED).done
             if any([conclude(future) for future in done]):
                 for future in wait(running).done:
@@ -295,7 +282,7 @@ def run_tasks[R](
             report(len(running))
     except (LibraryError, ClusterError) as error:
         raise type(error)(
-            f"{error}; finished environments are kept, run the same command to go on"
+            f"{error}; finished environments are kept, run the same command to resume"
         ) from error
     finally:
         for future in running:

@@ -1,6 +1,6 @@
-"""Where tasks run: in worker processes of this machine, or in this very process.
+"""Executors: worker processes on this machine, or the current process.
 
-Light to import: worker processes load this module before anything heavy.
+Keep this module light to import: worker processes load it first.
 """
 
 import os
@@ -17,33 +17,31 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 class Workers(Protocol):
-    """What the runner asks of an executor: `LocalWorkers`, `DaskWorkers`, `ThisProcess`."""
+    """Executor interface of the runner: `LocalWorkers`, `DaskWorkers`, `ThisProcess`."""
 
     def capacity(self) -> int:
-        """Returns how many tasks can run at a time; it may change."""
-        ...
+        """Returns the current number of tasks that can run concurrently."""
 
     def submit[T](self, work: Callable[..., T], /, *args: Any) -> Future[T]:
-        """Starts a call of a top-level function.
+        """Calls a top-level function in a worker.
 
-        Its future fails with a BrokenExecutor if a worker process died, perhaps another one's.
+        The future raises BrokenExecutor if any worker process died.
         """
-        ...
+        raise NotImplementedError
 
     def restart(self) -> None:
-        """Makes new workers after some died. No task is running."""
-        ...
+        """Replaces dead workers; called while no task is running."""
 
 
 class ThisProcess:
-    """Runs each task at once in this process: for notebooks, debugging and tests."""
+    """Runs tasks synchronously in the current process: for notebooks, debugging and tests."""
 
     def capacity(self) -> int:
         """Returns 1."""
         return 1
 
     def submit[T](self, work: Callable[..., T], /, *args: Any) -> Future[T]:
-        """Makes the call."""
+        """Calls the function."""
         future: Future[T] = Future()
         try:
             future.set_result(work(*args))
@@ -56,19 +54,15 @@ class ThisProcess:
 
 
 class LocalWorkers:
-    """Worker processes of this machine, as a context manager.
+    """Worker processes on this machine, as a context manager.
 
-    Leaving the context after an exception (Ctrl-C, full disk) ends the workers at once; they also
-    end when this process does, however it dies. A script that uses them needs the usual
+    Leaving the context with an exception (Ctrl-C, full disk) terminates the workers immediately;
+    they also end with this process, even if it is killed. Scripts need the usual
     `if __name__ == "__main__":`.
     """
 
     def __init__(self, count: int | None = None) -> None:
-        """Makes a pool; its processes start with the first tasks.
-
-        Args:
-            count: Number of processes; by default one a core.
-        """
+        """Creates a pool of `count` processes, by default one per core."""
         self._count = count or os.cpu_count() or 1
         self._start()
 
@@ -86,24 +80,24 @@ class LocalWorkers:
         return self._count
 
     def submit[T](self, work: Callable[..., T], /, *args: Any) -> Future[T]:
-        """Starts a call in a process."""
+        """Calls the function in a worker process."""
         try:
             with _starting_processes():
                 return self._executor.submit(work, *args)
-        except BrokenExecutor as error:  # A worker died while it was idle.
+        except BrokenExecutor as error:  # An idle worker died.
             future: Future[T] = Future()
             future.set_exception(error)
             return future
 
     def restart(self) -> None:
-        """Makes a new pool."""
+        """Replaces the pool."""
         self._parent.close()
         self._executor.shutdown()
         self._start()
 
     def _start(self) -> None:
         context = get_context("spawn")
-        # Workers wait for the end of a pipe whose other end only this process has.
+        # Workers wait on a pipe whose other end only this process holds.
         child, self._parent = context.Pipe(duplex=False)
         self._executor = ProcessPoolExecutor(
             self._count, mp_context=context, initializer=_end_with_parent, initargs=(child,)
@@ -112,10 +106,9 @@ class LocalWorkers:
 
 @contextmanager
 def _starting_processes() -> Iterator[None]:
-    """Lets processes that start in the block inherit what makes a good worker.
+    """Makes processes that start in the block ignore Ctrl-C and use one BLAS thread.
 
-    They never see Ctrl-C, which reaches the whole process group, and their linear algebra has
-    one thread: there are as many workers as cores.
+    Ctrl-C reaches the whole process group, and there are as many workers as cores.
     """
     in_main = threading.current_thread() is threading.main_thread()
     before = {name: os.environ.get(name) for name in _THREADS}
@@ -134,7 +127,7 @@ def _starting_processes() -> Iterator[None]:
 
 
 def _end_with_parent(child: Connection) -> None:
-    """Prepares a worker: it ends when the other end of the pipe is closed."""
+    """Initializes a worker: it exits when the other end of the pipe is closed."""
     threading.Thread(target=_wait_and_end, args=(child,), daemon=True).start()
 
 

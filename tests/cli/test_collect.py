@@ -63,10 +63,10 @@ def test_an_existing_library_goes_on_without_options_or_with_more_environments(
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--max-goals", "5"], "was begun with max_goals 4 instead of 5; give the same options"),
+        (["--max-goals", "5"], "was begun with max_goals 4 instead of 5; resume with the same"),
         (["--stream", "holdout"], "stream training instead of holdout"),
         (["--first", "1"], "first_environment 0 instead of 1"),
-        (["--environments", "1"], "2 environments, not 1"),
+        (["--environments", "1"], "environments 2 instead of 1"),
         (["--set", "{stop: {timeout_s: 20}}"], "scenario_digest"),
         (["--stream", "tuning"], "unknown stream 'tuning'; choose one of"),
         (["--environments", "0"], "environments must be from 1 to"),

@@ -49,7 +49,7 @@ def test_the_papers_library_of_apertures_has_7200_different_reaches() -> None:
         } == set(map(tuple, apertures[:, :2].tolist()))
 
 
-def test_starts_and_bases_belong_together_when_thinned() -> None:
+def test_starts_keep_their_bases_when_subsampled() -> None:
     scenario = load_scenario("cylinder-aperture-clutter")
     whole = CollectionRequest(scenario=scenario).starts(2)
     some = CollectionRequest(scenario=scenario, max_starts=4).starts(2)
@@ -69,7 +69,7 @@ def test_every_goal_is_tried_from_every_start() -> None:
 
 
 @pytest.mark.parametrize(("max_goals", "max_starts"), [(1, 60), (7, 4), (44, 20)])
-def test_thinning_is_even_and_keeps_the_order(max_goals: int, max_starts: int) -> None:
+def test_subsampling_is_even_and_keeps_the_order(max_goals: int, max_starts: int) -> None:
     request = make_request(max_goals=max_goals, max_starts=max_starts)
     for thinned, grid in (
         (request.goals(), SCENARIO.task.goal_area.grid()),
@@ -84,19 +84,11 @@ def test_thinning_is_even_and_keeps_the_order(max_goals: int, max_starts: int) -
         assert abs(gaps[0] - gaps[-1]) <= 1
 
 
-@pytest.mark.parametrize("overrides", ["", "{mpc: {preset: ijrr_2013}, clutter: {num_fixed: 3}}"])
-def test_a_request_comes_back_from_its_file(tmp_path: Path, overrides: str) -> None:
-    scenario = load_scenario("cylinder-clutter", overrides)
+def test_a_request_round_trips_through_its_file(tmp_path: Path) -> None:
+    scenario = load_scenario("cylinder-clutter", "{mpc: {preset: ijrr_2013}}")
     request = make_request(scenario=scenario, stream="holdout", max_starts=None)
     write_request(request, tmp_path / "request.yaml")
     assert read_request(tmp_path / "request.yaml") == request
-
-
-def _edited(path: Path, **values: object) -> Path:
-    write_request(make_request(), path)
-    data = yaml.safe_load(path.read_text())
-    path.write_text(yaml.safe_dump({**data, **values}))
-    return path
 
 
 @pytest.mark.parametrize(
@@ -104,22 +96,23 @@ def _edited(path: Path, **values: object) -> Path:
     [
         ({"environments": "many"}, LibraryError, "is not a collection request"),
         ({"surprise": 1}, LibraryError, "is not a collection request"),
-        ({"scenario": "cylinder-clutter"}, LibraryError, "is not a collection request"),
         ({"scenario_digest": "0" * 12}, LibraryError, "edited or another lic_drake wrote it"),
         ({"stream": "tuning"}, RequestError, "unknown stream 'tuning'; choose one of"),
     ],
 )
-def test_an_edited_request_file_is_refused(
+def test_an_edited_request_file_is_rejected(
     tmp_path: Path, values: dict[str, object], error: type[Exception], message: str
 ) -> None:
-    with pytest.raises(error, match=message):
-        read_request(_edited(tmp_path / "request.yaml", **values))
-
-
-@pytest.mark.parametrize("content", [b"", b"\xff\xfe\x00", b"- 1"])
-def test_a_file_that_is_no_request_is_named(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "request.yaml"
-    path.write_bytes(content)
+    write_request(make_request(), path)
+    path.write_text(yaml.safe_dump({**yaml.safe_load(path.read_text()), **values}))
+    with pytest.raises(error, match=message):
+        read_request(path)
+
+
+def test_a_file_that_is_not_a_request_is_rejected(tmp_path: Path) -> None:
+    path = tmp_path / "request.yaml"
+    path.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(LibraryError, match=r"request\.yaml is not a collection request"):
         read_request(path)
 
@@ -129,15 +122,15 @@ def test_a_file_that_is_no_request_is_named(tmp_path: Path, content: bytes) -> N
     [
         ({"environments": 0}, "environments must be from 1 to 1000000, got 0"),
         ({"first_environment": -1}, "must be from 0 to .*, got -1"),
-        ({"max_goals": 0}, "max_goals must be 1 or more, got 0"),
+        ({"max_goals": 0}, "max_goals must be from 1 to inf, got 0"),
     ],
 )
-def test_values_out_of_range_are_refused(values: dict[str, int], message: str) -> None:
+def test_values_out_of_range_are_rejected(values: dict[str, int], message: str) -> None:
     with pytest.raises(RequestError, match=message):
         make_request(**values)
 
 
-def test_a_start_line_out_of_reach_is_refused() -> None:
+def test_an_unreachable_start_line_is_rejected() -> None:
     scenario = load_scenario("cylinder-clutter", "{task: {start_line: {x_m: 3.0}}}")
-    with pytest.raises(RequestError, match="planar-arm can take no pose of the start line"):
+    with pytest.raises(RequestError, match="planar-arm can reach no pose of the start line"):
         make_request(scenario=scenario).starts()

@@ -72,13 +72,13 @@ def test_more_requests_into_an_environment_are_added_to_its_shard(
     assert len(reach.calls()) == len(requests)
 
 
-def test_another_request_is_refused_before_anything_is_simulated(
+def test_a_different_request_is_rejected_before_any_simulation(
     library: ExperienceLibrary, reach: FakeReach
 ) -> None:
     collect(library, REQUEST, reach=reach)
     other = load_scenario("cylinder-clutter", "{stop: {timeout_s: 20}}")
     for change, message in (
-        ({"environments": 2}, "3 environments, not 2"),
+        ({"environments": 2}, "environments 3 instead of 2"),
         ({"max_goals": 5}, "was begun with max_goals 4 instead of 5"),
         ({"scenario": other}, "scenario_digest"),
     ):
@@ -105,7 +105,7 @@ def test_shares_divide_the_environments_and_any_collection_completes_them(
     assert len(reach.calls()) == 60
 
 
-def test_reaches_that_came_from_elsewhere_are_not_simulated_again(
+def test_reaches_in_other_files_are_not_simulated_again(
     tmp_path: Path, library: ExperienceLibrary, reach: FakeReach
 ) -> None:
     collect(library, REQUEST, reach=reach)
@@ -127,13 +127,15 @@ def test_an_environment_that_raises_is_reported_and_the_rest_goes_on(
 
 
 @pytest.mark.parametrize("change", [{"key": "0" * 16}, {"lic_drake_version": "0.0.1"}])
-def test_the_records_of_a_worker_with_another_lic_drake_are_refused(
+def test_records_of_a_worker_with_another_lic_drake_are_rejected(
     library: ExperienceLibrary, change: dict[str, str]
 ) -> None:
     def strange(request: ReachRequest) -> ReachRecord:
         return replace(make_record(request), **change)
 
-    with pytest.raises(ClusterError, match="simulated other reaches than those of training-000000"):
+    with pytest.raises(
+        ClusterError, match="simulated different reaches from those of training-000000"
+    ):
         collect(library, REQUEST, reach=strange)
     assert library.successes() == {}
 
@@ -161,7 +163,7 @@ def test_a_full_disk_is_one_line_and_loses_no_finished_environment(
     assert len(reach.calls()) == 36 + 12
 
 
-def test_a_truncated_shard_is_named_and_its_reaches_come_back_after_its_deletion(
+def test_a_truncated_shard_is_named_and_simulated_again_once_deleted(
     library: ExperienceLibrary, reach: FakeReach
 ) -> None:
     collect(library, REQUEST, reach=reach)
