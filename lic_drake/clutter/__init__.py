@@ -1,1 +1,1 @@
-"""Clutter categories: plain arrays that say what stands where. No Drake here."""
+"""Clutter categories, sampled as plain arrays. No Drake here."""

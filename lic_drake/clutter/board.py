@@ -61,7 +61,7 @@ class ApertureBoard:
         return self.board_centre + offsets
 
     def bare_board(self, material: str = "") -> ClutterInstance:
-        """Returns the bars alone, with all apertures open: what is known in advance."""
+        """Returns the bars alone, with all apertures open, as known in advance."""
         a, b = self.aperture_m, self.bar_m
         width, height = self.columns * a, self.rows * a
         upright = [[0.0, a * i - 0.5 * width, 0.0] for i in range(self.columns + 1)]

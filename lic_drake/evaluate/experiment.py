@@ -34,7 +34,6 @@ from lic_drake.select.registry import (
     needs_library,
     split_method,
 )
-from lic_drake.types import Vector
 
 SAY_S = 5.0
 """Time between two progress messages, seconds."""
@@ -138,7 +137,18 @@ def run_evaluation(
             f" {evaluation.scenario_name or evaluation.experience} with"
             f" {evaluation.overrides or 'no overrides'}; choose another folder for the results"
         )
-    plan = _Plan.of(evaluation, scenario)
+    attempts = evaluation.second_attempts
+    plan = _Plan(
+        name=uuid4().hex,
+        # Workers may run in another folder.
+        evaluation=replace(
+            evaluation,
+            experience=evaluation.experience.absolute(),
+            second_attempts=attempts and attempts.absolute(),
+        ),
+        scenario=scenario,
+        cameras=load_cameras(evaluation.cameras) if evaluation.cameras else None,
+    )
     first = evaluation.first_environment
     environments = range(first, first + evaluation.environments)
     began_s = time.perf_counter()
@@ -196,33 +206,12 @@ def _first_rates(rows: Sequence[TrialRow]) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class _Plan:
-    """What workers need; plans are compared by name.
-
-    Attributes:
-        name: Unique for each run of an evaluation.
-        evaluation: Its parameters, with absolute paths.
-        scenario: The evaluated scenario.
-        cameras: Cameras that perceive apertures and goal.
-    """
+    """What workers need; plans are compared by name, unique for each run of an evaluation."""
 
     name: str
     evaluation: Evaluation = field(compare=False)
     scenario: Scenario = field(compare=False)
     cameras: CamerasConfig | None = field(compare=False)
-
-    @classmethod
-    def of(cls, evaluation: Evaluation, scenario: Scenario) -> "_Plan":
-        attempts = evaluation.second_attempts
-        return cls(
-            name=uuid4().hex,
-            evaluation=replace(
-                evaluation,
-                experience=evaluation.experience.absolute(),
-                second_attempts=attempts and attempts.absolute(),
-            ),
-            scenario=scenario,
-            cameras=load_cameras(evaluation.cameras) if evaluation.cameras else None,
-        )
 
 
 class _Strategies:
@@ -307,7 +296,16 @@ def _trials(
     for goal in range(evaluation.goals):
         at = evaluation.first_environment if evaluation.common_goals else environment
         p_WG = plan.scenario.sample_goal(evaluation.stream, at, goal)
-        observer = _observer(plan, environment, p_WG)
+        observer = None
+        if plan.cameras is not None:  # All strategies share its images.
+            observer = Observer(
+                scenario=plan.scenario,
+                stream=evaluation.stream,
+                environment=environment,
+                p_WG=p_WG,
+                cameras=plan.cameras,
+                moves=evaluation.moves,
+            )
         for method in evaluation.methods:
             attempts = run_trial(
                 plan.scenario,
@@ -332,17 +330,3 @@ def _trials(
             # A renderer takes 150 MB, and only the collector frees its reference cycle.
             del observer
             gc.collect()
-
-
-def _observer(plan: _Plan, environment: int, p_WG: Vector) -> Observer | None:
-    """Returns the observer of an environment, whose images all strategies share."""
-    if plan.cameras is None:
-        return None
-    return Observer(
-        scenario=plan.scenario,
-        stream=plan.evaluation.stream,
-        environment=environment,
-        p_WG=p_WG,
-        cameras=plan.cameras,
-        moves=plan.evaluation.moves,
-    )

@@ -84,7 +84,7 @@ class SceneConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """A finalized plant and what is in it.
+    """A finalized plant with its contents.
 
     Attributes:
         plant: The plant.
