@@ -2,9 +2,8 @@
 
 from sklearn.ensemble import HistGradientBoostingClassifier
 
-from lic_drake.estimate.estimator import SuccessEstimator, from_sklearn
+from lic_drake import SuccessEstimator, from_sklearn, register_estimator
 from lic_drake.estimate.features import FeatureMap
-from lic_drake.estimate.registry import register_estimator
 
 
 def boosting(features: FeatureMap) -> SuccessEstimator:

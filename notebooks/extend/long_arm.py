@@ -3,10 +3,9 @@
 from functools import cache
 from xml.etree import ElementTree
 
+from lic_drake import Arm, register_robot
 from lic_drake.paths import models_dir
-from lic_drake.robots.arm import Arm
 from lic_drake.robots.planar import make_planar_arm
-from lic_drake.robots.registry import register_robot
 
 LONGER_M = 0.06
 SOFTER = 0.5
