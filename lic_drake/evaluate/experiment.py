@@ -3,7 +3,7 @@
 import gc
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
@@ -12,7 +12,7 @@ from uuid import uuid4
 import numpy as np
 
 from lic_drake.errors import LibraryError
-from lic_drake.evaluate.trial import Attempt, run_trial
+from lic_drake.evaluate.trial import run_trial
 from lic_drake.evaluate.trials import TrialRow, read_trials, write_trials
 from lic_drake.experience.pairs import pair_second_attempts
 from lic_drake.experience.runner import Task, add_to_shard, refuse_failed, run_tasks, shard_name
@@ -133,18 +133,16 @@ def run_evaluation(
     library.create()
     if library.shard_paths() and library.header().scenario_digest != scenario.digest:
         raise LibraryError(
-            f"{library.path} holds reaches of another scenario than"
+            f"{library.path} holds reaches of a different scenario from"
             f" {evaluation.scenario_name or evaluation.experience} with"
             f" {evaluation.overrides or 'no overrides'}; choose another folder for the results"
         )
-    attempts = evaluation.second_attempts
     plan = _Plan(
         name=uuid4().hex,
-        # Workers may run in another folder.
-        evaluation=replace(
+        evaluation=replace(  # Workers may run in other folders.
             evaluation,
             experience=evaluation.experience.absolute(),
-            second_attempts=attempts and attempts.absolute(),
+            second_attempts=evaluation.second_attempts and evaluation.second_attempts.absolute(),
         ),
         scenario=scenario,
         cameras=load_cameras(evaluation.cameras) if evaluation.cameras else None,
@@ -206,7 +204,7 @@ def _first_rates(rows: Sequence[TrialRow]) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class _Plan:
-    """What workers need; plans are compared by name, unique for each run of an evaluation."""
+    """What workers need; plans are compared by name, which is unique for each run."""
 
     name: str
     evaluation: Evaluation = field(compare=False)
@@ -267,37 +265,12 @@ def _try_environment(
             new.append(records[request.key])
         return records[request.key]
 
-    rows = [
-        TrialRow(
-            variant=plan.evaluation.variant,
-            method=method,
-            environment=environment,
-            goal=goal,
-            attempt=number,
-            key=attempt.request.key,
-            # All attempts but the last one failed.
-            success=won and number == len(attempts),
-            probability=float("nan")
-            if attempt.selection.probability is None
-            else attempt.selection.probability,
-            seconds=attempt.selection.seconds,
-        )
-        for method, goal, attempts, won in _trials(plan, environment, reach)
-        for number, attempt in enumerate(attempts, start=1)
-    ]
-    return rows, new
-
-
-def _trials(
-    plan: _Plan, environment: int, reach: Callable[[ReachRequest], ReachRecord]
-) -> Iterator[tuple[str, int, list[Attempt], bool]]:
-    """Yields method, goal, attempts and success of each trial in an environment."""
-    evaluation, strategies = plan.evaluation, _strategies(plan)
+    evaluation, strategies, rows = plan.evaluation, _strategies(plan), list[TrialRow]()
     for goal in range(evaluation.goals):
         at = evaluation.first_environment if evaluation.common_goals else environment
         p_WG = plan.scenario.sample_goal(evaluation.stream, at, goal)
-        observer = None
-        if plan.cameras is not None:  # All strategies share its images.
+        observer = None  # All strategies see the same images.
+        if plan.cameras is not None:
             observer = Observer(
                 scenario=plan.scenario,
                 stream=evaluation.stream,
@@ -320,13 +293,25 @@ def _trials(
                 look=observer,
             )
             last = attempts[-1].record
-            yield (
-                method,
-                goal,
-                attempts,
-                last.success if observer is None else observer.touches_ball(last),
-            )
+            won = last.success if observer is None else observer.touches_ball(last)
+            for number, attempt in enumerate(attempts, start=1):
+                probability = attempt.selection.probability
+                rows.append(
+                    TrialRow(
+                        variant=evaluation.variant,
+                        method=method,
+                        environment=environment,
+                        goal=goal,
+                        attempt=number,
+                        key=attempt.request.key,
+                        # All attempts but the last one failed.
+                        success=won and number == len(attempts),
+                        probability=float("nan") if probability is None else probability,
+                        seconds=attempt.selection.seconds,
+                    )
+                )
         if observer is not None:
-            # A renderer takes 150 MB, and only the collector frees its reference cycle.
+            # A renderer takes 150 MB in a reference cycle, which only the collector frees.
             del observer
             gc.collect()
+    return rows, new

@@ -23,7 +23,7 @@ EASY = "{clutter: {num_movable: 2, num_fixed: 2}, stop: {timeout_s: 0.2}}"
 def make_library(
     path: Path, category: str = "cylinder-clutter", overrides: str = EASY
 ) -> ExperienceLibrary:
-    """A library in which every start left of the middle succeeds, and no other."""
+    """A library in which exactly the starts left of the middle succeed."""
     scenario = load_scenario(category, overrides)
     library = ExperienceLibrary(path)
     request = make_request(scenario=scenario, max_goals=6, max_starts=9)
@@ -38,7 +38,7 @@ def make_library(
 
 @pytest.fixture
 def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Keys of the reaches simulated, which are made-up ones in this process."""
+    """Keys of the simulated (here: fake) reaches."""
     keys: list[str] = []
 
     def reach(request: ReachRequest) -> ReachRecord:
@@ -93,7 +93,7 @@ def test_strategies_are_tried_at_the_same_goals_of_the_same_environments(
         assert (record.stream, record.environment) == ("evaluation", row.environment)
         expected = scenario.sample_goal("evaluation", row.environment, row.goal)
         np.testing.assert_array_equal(record.p_WG, expected)
-    # What was learned from the library: starts left of the middle.
+    # Learned from the library: starts left of the middle succeed.
     assert all(records[row.key].start_y > 0.0 for row in firsts if row.method == "gp1")
     assert any(records[row.key].start_y < 0.0 for row in firsts if row.method == "rnd")
     assert lines[-1].startswith(f"  3/3 environments, {len(rows)} attempts, gp1 ")
@@ -115,34 +115,39 @@ def test_rows_agree_with_the_library_of_reaches(tmp_path: Path, calls: list[str]
         assert [row.attempt for row in trial] == list(range(1, len(trial) + 1))
         assert not any(row.success for row in trial[:-1])
         assert trial[-1].success or len(trial) == 3
-        # Each found the environment as those before it left it.
+        # Each attempt finds the environment as the previous ones left it.
         chain = [ReachRequest.from_record(records[row.key], scenario) for row in trial]
         for number, request in enumerate(chain):
             assert len(request.after) == number
             assert request.before() == (chain[number - 1] if number else None)
 
 
-def test_fresh_attempts_find_the_environment_as_it_was_drawn(
+def test_fresh_attempts_find_a_reset_environment_and_environments_may_share_goals(
     tmp_path: Path, calls: list[str]
 ) -> None:
-    asked = evaluation(tmp_path, fresh=True, variant="fresh")
+    asked = evaluation(
+        tmp_path, fresh=True, variant="fresh", common_goals=True, first_environment=4
+    )
     rows = run_evaluation(asked, say=quiet)
     assert any(row.attempt == 2 for row in rows)
-    assert all(record.after == () for record in asked.reaches.records())
     assert {row.variant for row in rows} == {"fresh"}
+    records, scenario = asked.reaches.records(), asked.reaches.scenario()
+    assert all(record.after == () for record in records)
+    expected = {tuple(scenario.sample_goal("evaluation", 4, goal)) for goal in (0, 1)}
+    assert {tuple(record.p_WG) for record in records} == expected
 
 
-def test_run_again_it_simulates_nothing_and_gives_the_same_rows(
+def test_a_second_run_simulates_nothing_and_returns_the_same_rows(
     tmp_path: Path, calls: list[str]
 ) -> None:
     asked = evaluation(tmp_path)
-    rows = run_evaluation(asked, say=quiet)
+    rows = without_times(run_evaluation(asked, say=quiet))
     content = comparable(asked.reaches.records())
     calls.clear()
-    assert without_times(run_evaluation(asked, say=quiet)) == without_times(rows)
+    assert without_times(run_evaluation(asked, say=quiet)) == rows
+    assert without_times(read_trials(asked.trials_path)) == rows
     assert calls == []
     assert comparable(asked.reaches.records()) == content
-    assert without_times(read_trials(asked.trials_path)) == without_times(rows)
 
 
 def test_an_interrupted_evaluation_simulates_nothing_twice(
@@ -172,34 +177,26 @@ def test_an_interrupted_evaluation_simulates_nothing_twice(
     assert [path.name for path in asked.reaches.shard_paths()] == ["reaches.parquet"]
 
 
-def test_more_goals_environments_or_attempts_keep_what_was_simulated(
-    tmp_path: Path, calls: list[str]
-) -> None:
+def test_larger_evaluations_reuse_simulated_reaches(tmp_path: Path, calls: list[str]) -> None:
     small = evaluation(tmp_path, environments=2, goals=1, attempts=1)
     first = run_evaluation(small, say=quiet)
     large = replace(small, environments=3, goals=2, attempts=2)
     calls.clear()
     rows = run_evaluation(large, say=quiet)
     assert not set(calls) & {row.key for row in first}
-    # Also RND's draws, which do not depend on how many others there are.
+    # This includes RND's draws, which are independent of the number of trials.
     assert set(without_times(first)) <= set(without_times(rows))
 
 
-def test_the_file_keeps_the_trials_of_other_variants_and_strategies(
+def test_the_file_keeps_trials_of_other_variants_and_strategies(
     tmp_path: Path, calls: list[str]
 ) -> None:
-    def file() -> list[tuple[str, str]]:
-        rows = read_trials(tmp_path / "out" / "trials.parquet")
-        return sorted({(row.variant, row.method) for row in rows})
-
     plain = evaluation(tmp_path, methods=("rnd", "cost"))
     rows = run_evaluation(plain, say=quiet)
     fresh = run_evaluation(replace(plain, fresh=True, variant="fresh"), say=quiet)
     more = run_evaluation(replace(plain, methods=("gp1",)), say=quiet)
-    assert file() == [("", "cost"), ("", "gp1"), ("", "rnd"), ("fresh", "cost"), ("fresh", "rnd")]
-    # Again with fewer environments: those trials replace the older ones of the same name.
+    # Fewer environments: replaces the trials of the same variant and method.
     fewer = run_evaluation(replace(plain, methods=("rnd",), environments=1), say=quiet)
-    assert file() == [("", "cost"), ("", "gp1"), ("", "rnd"), ("fresh", "cost"), ("fresh", "rnd")]
     expected = [*(row for row in rows if row.method == "cost"), *fresh, *more, *fewer]
     stored = read_trials(tmp_path / "out" / "trials.parquet")
     assert sorted(without_times(stored)) == sorted(without_times(expected))
@@ -208,26 +205,13 @@ def test_the_file_keeps_the_trials_of_other_variants_and_strategies(
 def test_one_strategy_may_follow_another(tmp_path: Path, calls: list[str]) -> None:
     asked = evaluation(tmp_path, methods=("rnd", "cost", "rnd>cost"))
     rows = run_evaluation(asked, say=quiet)
-    by = {(row.method, row.environment, row.goal, row.attempt): row for row in rows}
-    seconds = 0
-    for (method, environment, goal, attempt), row in by.items():
-        if method != "rnd>cost":
-            continue
+    keys = {(row.method, row.environment, row.goal, row.attempt): row.key for row in rows}
+    combined = [trial for method, *trial in keys if method == "rnd>cost"]
+    assert any(attempt == 2 for *_, attempt in combined)
+    for environment, goal, attempt in combined:
         if attempt == 1:
-            assert row.key == by["rnd", environment, goal, 1].key
-        else:
-            seconds += 1
-    assert seconds > 0
-
-
-def test_all_environments_may_share_the_goals_of_the_first(
-    tmp_path: Path, calls: list[str]
-) -> None:
-    asked = evaluation(tmp_path, common_goals=True, first_environment=4)
-    run_evaluation(asked, say=quiet)
-    scenario = asked.reaches.scenario()
-    expected = {tuple(scenario.sample_goal("evaluation", 4, goal)) for goal in (0, 1)}
-    assert {tuple(record.p_WG) for record in asked.reaches.records()} == expected
+            trial = (environment, goal, attempt)
+            assert keys["rnd>cost", *trial] == keys["rnd", *trial]
 
 
 def test_apertures_are_evaluated_with_bases(tmp_path: Path, calls: list[str]) -> None:
@@ -259,29 +243,26 @@ def test_processes_and_a_cluster_give_the_rows_and_reaches_of_this_process(
             results.append((without_times(rows), comparable(asked.reaches.records())))
     assert results[0] == results[1] == results[2]
     assert len(results[0][0]) > 6
-    # Simulated ones: none takes longer than it may.
+    # These were simulated: the longest ends by the time limit.
     assert max(record.duration_s for record in asked.reaches.records()) == pytest.approx(0.2)
 
 
-def test_unknown_method_is_refused_before_any_reach(tmp_path: Path, calls: list[str]) -> None:
+def test_unknown_methods_and_results_of_other_scenarios_are_rejected_before_any_reach(
+    tmp_path: Path, calls: list[str]
+) -> None:
     with pytest.raises(RequestError, match="unknown method 'svm'"):
         run_evaluation(evaluation(tmp_path, methods=("rnd", "svm")))
     assert not (tmp_path / "out").exists()
-    assert calls == []
-
-
-def test_results_of_another_scenario_are_refused_before_any_reach(
-    tmp_path: Path, calls: list[str]
-) -> None:
-    run_evaluation(evaluation(tmp_path), say=quiet)
+    asked = evaluation(tmp_path, methods=("rnd",))
+    run_evaluation(asked, say=quiet)
     make_library(tmp_path / "other", overrides="{stop: {timeout_s: 0.4}}")
     calls.clear()
-    with pytest.raises(LibraryError, match="holds reaches of another scenario"):
-        run_evaluation(evaluation(tmp_path, experience=tmp_path / "other", goals=1), say=quiet)
+    with pytest.raises(LibraryError, match="holds reaches of a different scenario"):
+        run_evaluation(replace(asked, experience=tmp_path / "other"), say=quiet)
     assert calls == []
 
 
-def test_what_is_wrong_in_a_worker_is_told_as_it_is(tmp_path: Path) -> None:
+def test_errors_in_a_worker_are_passed_on(tmp_path: Path) -> None:
     asked = evaluation(tmp_path)
     (shard, *_) = ExperienceLibrary(tmp_path / "library").shard_paths()
     content = shard.read_bytes()

@@ -18,7 +18,7 @@ BOTH = pytest.mark.parametrize("scenario", [LINE, APERTURES], ids=["line", "aper
 
 @dataclass
 class Watched:
-    """A random strategy that keeps what it was asked."""
+    """A random strategy that records its situations."""
 
     method: str = "watched"
     situations: list[Situation] = field(default_factory=list)
@@ -50,7 +50,7 @@ def test_a_trial_ends_with_its_first_success_or_its_last_attempt(scenario: Scena
 
 
 @BOTH
-def test_a_reach_is_the_selections_in_the_environment_with_the_goal(scenario: Scenario) -> None:
+def test_requests_have_the_selected_start_and_the_trials_goal(scenario: Scenario) -> None:
     selector = Watched()
     for attempt in run_trial(scenario, selector, "evaluation", 5, GOAL, 3, reach=failing):
         request, chosen = attempt.request, attempt.selection
@@ -68,21 +68,19 @@ def test_a_reach_is_the_selections_in_the_environment_with_the_goal(scenario: Sc
 
 
 @BOTH
-def test_later_attempts_come_after_the_earlier_ones(scenario: Scenario) -> None:
+def test_later_attempts_follow_earlier_ones_unless_the_environment_is_reset(
+    scenario: Scenario,
+) -> None:
     first, second, third = run_trial(scenario, Watched(), "evaluation", 5, GOAL, 3, reach=failing)
     assert first.request.after == ()
     assert second.request.before() == first.request
     assert third.request.before() == second.request
-
-
-@BOTH
-def test_fresh_attempts_come_after_nothing(scenario: Scenario) -> None:
     done = run_trial(scenario, Watched(), "evaluation", 5, GOAL, 3, fresh=True, reach=failing)
     assert [attempt.request.after for attempt in done] == [(), (), ()]
 
 
 @BOTH
-def test_a_strategy_knows_what_the_failed_attempts_showed(scenario: Scenario) -> None:
+def test_a_strategy_receives_the_failed_attempts(scenario: Scenario) -> None:
     selector = Watched()
     done = run_trial(scenario, selector, "evaluation", 5, GOAL, 3, reach=failing)
     assert [len(situation.failed) for situation in selector.situations] == [0, 1, 2]
