@@ -27,7 +27,7 @@ def add_parser(subparsers: Subparsers) -> None:
         description="Chooses the start for a goal from an experience library and prints it with its"
         " estimated probability of success.",
         epilog="examples: lic select --goal 0.6 0.1 --method gp; lic select --goal 0.6 0.1 --failed"
-        " start_y=0.1 start_phi=0.52 final_x=0.5 final_y=0.05",
+        ' "{start_y: 0.1, start_phi: 0.52, final_x: 0.5, final_y: 0.05}"',
     )
     parser.add_argument(
         "--goal",
@@ -40,22 +40,13 @@ def add_parser(subparsers: Subparsers) -> None:
     add_method_argument(parser)
     parser.add_argument(
         "--failed",
-        nargs="+",
         action="append",
         default=[],
-        metavar="NAME=VALUE",
-        help="what an attempt that failed showed, by the names of a record's columns, in metres,"
-        " radians and m/s: start_y, start_phi and for LIC-2 the final pose, for the PR2 start_y and"
-        " start_z of the aperture, base_y and torso; may be given several times (default: none)",
-    )
-    parser.add_argument(
-        "--failed-record",
-        type=Path,
-        action="append",
-        default=[],
-        metavar="FILE",
-        help="the same as a file that `lic reach --json` wrote; may be given several times"
-        " (default: none)",
+        metavar="YAML|FILE",
+        help="what an attempt that failed showed, by the names of a record's columns (metres,"
+        " radians, m/s), or a file that `lic reach --json` wrote: start_y, start_phi and for LIC-2"
+        " the final pose, for the PR2 start_y and start_z of the aperture, base_y and torso; may be"
+        " given several times (default: none)",
     )
     add_library_argument(parser)
     parser.add_argument(
@@ -90,9 +81,7 @@ def run(args: argparse.Namespace) -> int:
     starts = make_starts(scenario, instance)
     bases = np.unique(starts.grid.b0, axis=0)
     check_goal(scenario, p_WG - bases[np.argmin(np.linalg.norm((bases - p_WG)[:, 1:], axis=1))])
-    shown = [_read_values(values) for values in args.failed]
-    shown += [_read_record(path) for path in args.failed_record]
-    failed = tuple(_failed_reach(starts, values) for values in shown)
+    failed = tuple(_failed_reach(starts, _read_shown(text)) for text in args.failed)
     rng = np.random.default_rng(args.seed)
     selector = make_selector(args.method, scenario.arm(), library.columns(), rng, scenario.category)
     for reach in failed:
@@ -137,47 +126,29 @@ def _describe(chosen: "Selection", starts: "FeasibleStarts") -> str:
     )
 
 
-def _read_values(values: list[str]) -> dict[str, float]:
-    """Reads NAME=VALUE.
+def _read_shown(text: str) -> dict[str, float]:
+    """Reads the numbers of a failed attempt from YAML or JSON, in the argument or in a file.
 
     Raises:
-        RequestError: One is not of that form, or of an unknown name.
+        LicError: It is no mapping, the file cannot be read, or a name is not a record's.
     """
-    from lic_drake.errors import RequestError
-    from lic_drake.experience.pairs import SHOWN
+    from dataclasses import fields
 
-    known = (*SHOWN, "base_x", "base_y", "torso")
-    read = {}
-    for text in values:
-        name, _, value = text.partition("=")
+    from lic_drake.config import read_mapping
+    from lic_drake.errors import RequestError
+    from lic_drake.reach.request import ReachRecord
+
+    if not text.lstrip().startswith("{"):
         try:
-            read[name] = float(value)
-        except ValueError:
-            name = ""
+            text = Path(text).read_text(encoding="utf-8")
+        except (OSError, ValueError) as error:
+            raise RequestError(f"--failed: cannot read {text!r}: {error}") from None
+    shown = read_mapping(text, "--failed")
+    known = {item.name for item in fields(ReachRecord)}
+    for name in shown:
         if name not in known:
-            raise RequestError(
-                f"--failed needs NAME=VALUE with a number and one of {', '.join(known)}, got"
-                f" {text!r}"
-            )
-    return read
-
-
-def _read_record(path: Path) -> dict[str, float]:
-    """Reads a record that `lic reach --json` wrote.
-
-    Raises:
-        RequestError: The file cannot be read.
-    """
-    from lic_drake.errors import RequestError
-
-    try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-        values = {name: float(x) for name, x in record.items() if isinstance(x, int | float)}
-    except (OSError, ValueError, AttributeError) as error:
-        raise RequestError(
-            f"--failed-record: {path} is no record as `lic reach --json` writes it: {error}"
-        ) from None
-    return values
+            raise RequestError(f"--failed: {name!r} is no column of a record, as start_y is")
+    return {name: float(x) for name, x in shown.items() if isinstance(x, int | float)}
 
 
 def _failed_reach(starts: "FeasibleStarts", shown: dict[str, float]) -> "FailedReach":
@@ -232,6 +203,6 @@ def _check_shown(selector: "Selector", failed: "FailedReach") -> None:
     if missing:
         raise RequestError(
             f"{selector.method} chooses a further start by what the failed attempt showed"
-            f" ({', '.join(needed)}), and {', '.join(missing)} is missing; add it to --failed, give"
-            f" --failed-record, or take --method {selector.method}1, which only keeps away from it"
+            f" ({', '.join(needed)}), and {', '.join(missing)} is missing; add it to --failed, or"
+            f" take --method {selector.method}1, which only keeps away from where it began"
         )

@@ -11,8 +11,8 @@ from lic_drake.select.registry import make_selector
 from lic_drake.select.situation import FailedReach, Situation
 from lic_drake.starts import make_starts
 
-START = ["start_y=-0.1", "start_phi=0.5235987755982988"]
-FINAL = ["final_x=0.52", "final_y=-0.02"]
+START = {"start_y": -0.1, "start_phi": 0.5235987755982988}
+FINAL = {"final_x": 0.52, "final_y": -0.02}
 
 
 def select(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
@@ -25,16 +25,15 @@ def test_after_a_failure_the_command_answers_as_lic_2_does(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     arguments = ["--goal", "0.6", "0.1", "--method", "knn", "--json"]
-    code, out, _ = select(capsys, *arguments, "--failed", *START, *FINAL)
+    code, out, _ = select(capsys, *arguments, "--failed", json.dumps(START | FINAL))
     assert code == 0
     library = ExperienceLibrary(shipped_library("cylinder-clutter"))
     scenario = library.scenario()
     selector = make_selector("knn", scenario.arm(), library.columns(), category=scenario.category)
     starts = make_starts(scenario, scenario.sample_instance("evaluation", 0))
-    shown = {name: float(x) for name, x in (item.split("=") for item in (*START, *FINAL))}
-    row = np.flatnonzero(np.isclose(starts.grid.x0[:, 1:], list(shown.values())[:2]).all(axis=1))
+    row = np.flatnonzero(np.isclose(starts.grid.x0[:, 1:], list(START.values())).all(axis=1))
     known = FailedReach.from_start(starts.grid[int(row[0])])
-    failed = FailedReach(start=known.start, shown={**known.shown, **shown})
+    failed = FailedReach(start=known.start, shown={**known.shown, **FINAL})
     asked = Situation(p_WG=np.array([0.6, 0.1, 0.0]), starts=starts, failed=(failed,))
     chosen = selector.select(asked)
     answer = json.loads(out)
@@ -42,21 +41,20 @@ def test_after_a_failure_the_command_answers_as_lic_2_does(
     assert answer["estimated_success"] == pytest.approx(chosen.probability)
     # It differs from the best start of LIC-1 away from the failure.
     code, out, _ = select(
-        capsys, "--goal", "0.6", "0.1", "--method", "knn1", "--json", "--failed", *START
+        capsys, "--goal", "0.6", "0.1", "--method", "knn1", "--json", "--failed", str(START)
     )
     assert code == 0
     assert json.loads(out)["estimated_success"] != pytest.approx(answer["estimated_success"])
 
 
 def test_a_record_says_all_of_a_failure(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    record = {"outcome": "stuck", "start_y": -0.1, "start_phi": 0.5235987755982988}
-    record |= {"start_x": 0.335, "final_x": 0.52, "final_y": -0.02, "base_y": 0.0}
+    record = START | FINAL | {"outcome": "stuck", "start_x": 0.335, "base_y": 0.0, "after": []}
     path = tmp_path / "record.json"
     path.write_text(json.dumps(record))
     arguments = ["--goal", "0.6", "0.1", "--method", "knn", "--json"]
     answers = [
-        json.loads(select(capsys, *arguments, *failed)[1])["start"]
-        for failed in (["--failed-record", str(path)], ["--failed", *START, *FINAL])
+        json.loads(select(capsys, *arguments, "--failed", failed)[1])["start"]
+        for failed in (str(path), str(START | FINAL))
     ]
     assert answers[0] == answers[1]
 
@@ -64,20 +62,17 @@ def test_a_record_says_all_of_a_failure(capsys: pytest.CaptureFixture[str], tmp_
 @pytest.mark.parametrize(
     ("failed", "message"),
     [
-        (["--failed", *START], "final_x, final_y is missing; add it to --failed, give"),
-        (["--failed", "start_y=0.1"], "must say where it began: start_phi is missing"),
-        (
-            ["--failed", "start_y=left"],
-            "--failed needs NAME=VALUE with a number and one of",
-        ),
-        (["--failed", "colour=3"], "got 'colour=3'"),
-        (["--failed-record", "no.json"], "is no record as `lic reach --json` writes it"),
+        (str(START), "final_x, final_y is missing; add it to --failed, or take --method knn1"),
+        ("{start_y: 0.1}", "must say where it began: start_phi is missing"),
+        ("{colour: 3}", "'colour' is no column of a record"),
+        ("{start_y: [", "--failed: not YAML"),
+        ("no.json", "--failed: cannot read 'no.json'"),
     ],
 )
 def test_what_lic_2_cannot_use_is_refused_and_never_dropped(
-    failed: list[str], message: str, capsys: pytest.CaptureFixture[str]
+    failed: str, message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    code, out, err = select(capsys, "--goal", "0.6", "0.1", "--method", "knn", *failed)
+    code, out, err = select(capsys, "--goal", "0.6", "0.1", "--method", "knn", "--failed", failed)
     assert code == 2 and out == ""
     assert message in err
 
@@ -87,9 +82,9 @@ def test_for_a_pr2_base_and_torso_of_the_failure_count(capsys: pytest.CaptureFix
     arguments = [*library, "--goal", "0.84", "-0.29", "0.79", "--method", "cost", "--json"]
     first = json.loads(select(capsys, *arguments)[1])
     _, y, z = first["start"][:3]
-    where = [f"start_y={y}", f"start_z={z}"]
-    code, _, err = select(capsys, *arguments, "--failed", *where)
+    where = {"start_y": y, "start_z": z}
+    code, _, err = select(capsys, *arguments, "--failed", str(where))
     assert code == 2 and "base_y, torso is missing" in err
-    base = [f"base_y={first['base'][1]}", f"torso={first['torso']}"]
-    second = json.loads(select(capsys, *arguments, "--failed", *where, *base)[1])
+    where |= {"base_y": first["base"][1], "torso": first["torso"]}
+    second = json.loads(select(capsys, *arguments, "--failed", str(where))[1])
     assert np.linalg.norm(np.subtract(second["start"][:3], first["start"][:3])) > 0.19
