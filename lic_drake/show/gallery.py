@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.figure import Figure
 
 import lic_drake
 from lic_drake.evaluate.paper import label
@@ -18,9 +17,8 @@ from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.session import simulate_request
 from lic_drake.select.registry import make_selector
 from lic_drake.show.figures import ShownTrial, describe_start, is_reachable
-from lic_drake.show.page import UNPACK, make_page, pack, picture
-from lic_drake.show.pictures import record_trial
-from lic_drake.show.views import draw_view
+from lic_drake.show.page import embed, make_page, picture
+from lic_drake.show.pictures import path_figure, record_trial
 from lic_drake.types import Vector
 
 MAX_ENVIRONMENTS = 300
@@ -45,29 +43,9 @@ section { background: #fff; border: 1px solid #ddd; border-radius: 6px; padding:
   margin: 1rem 0; }
 .reached { color: #1a7f37; } .missed { color: #b42318; }
 .stage { display: grid; grid-template-columns: minmax(0, 1fr) minmax(0, 1fr); gap: 1rem; }
-.scene { min-height: 24rem; background: #f7f7fa; border: 1px solid #ddd; position: relative; }
-.scene iframe { border: 0; height: 100%; position: absolute; inset: 0; }
-.scene button { position: absolute; inset: 0; margin: auto; width: 11rem; height: 3rem;
-  font: inherit; cursor: pointer; }
-.numbers { overflow-x: auto; }
+.scene button { font: inherit; margin-bottom: 0.5rem; cursor: pointer; }
 table { border-collapse: collapse; font-size: 0.9rem; }
 th, td { padding: 0.2rem 0.8rem 0.2rem 0; text-align: right; border-bottom: 1px solid #eee; }
-@media (max-width: 50rem) { .stage { grid-template-columns: 1fr; } }
-"""
-
-# Recordings start on request: many at a time would be too much for a browser.
-_SCRIPT = f"""
-const unpack = {UNPACK};
-async function play(scene) {{
-  const frame = document.createElement("iframe");
-  frame.title = scene.dataset.title;
-  scene.replaceChildren(frame);
-  frame.srcdoc = await unpack(document.getElementById(scene.dataset.recording).textContent);
-}}
-for (const scene of document.querySelectorAll(".scene"))
-  scene.querySelector("button").addEventListener("click", () => play(scene));
-const asked = location.hash && document.getElementById(location.hash.slice(1));
-if (asked) play(asked.querySelector(".scene"));
 """
 
 
@@ -154,10 +132,8 @@ def _exhibit(scenario: Scenario, environment: int, p_WG: Vector, done: list[Atte
     trial = ShownTrial(
         scenario=scenario, instance=instance, p_WG=p_WG, attempts=done, traces=traces
     )
-    figure = Figure(figsize=(6, 6.4), layout="constrained")
-    draw_view(figure.subplots(), scenario, instance, p_WG, trial.labelled_traces())
     view = io.BytesIO()
-    figure.savefig(view, format="png", dpi=80)
+    path_figure(trial).savefig(view, format="png", dpi=80)
     return Exhibit(
         scenario=scenario,
         environment=environment,
@@ -188,7 +164,7 @@ def make_gallery(exhibits: Sequence[Exhibit], method: str) -> str:
         f"<footer>Made by lic_drake {lic_drake.__version__} with Drake"
         f" {html.escape(', '.join(versions))}; the page needs no network.</footer>"
     )
-    return make_page("Reaches into clutter", "\n".join(parts), _STYLE, _SCRIPT)
+    return make_page("Reaches into clutter", "\n".join(parts), _STYLE)
 
 
 def numbers_of(number: int, attempt: Attempt) -> dict[str, object]:
@@ -222,31 +198,28 @@ def _section(exhibit: Exhibit) -> str:
 <h3>Environment {exhibit.environment}, goal ({goal}) m: <span class="{kind}">{word}</span></h3>
 <div class="stage">
 {picture(exhibit.view, "image/png", alt=f"{name} from above")}
-<div class="scene" data-recording="{name}-recording" data-title="{name}">
-<button>Play the recording</button></div>
+<div class="scene">{embed(exhibit.recording, name, button="Play the recording")}</div>
 </div>
-<div class="numbers"><table>
+<table>
 <tr>{"".join(f"<th>{head}</th>" for head in HEADS)}</tr>
 {rows}
-</table></div>
+</table>
 <p><small>Scenario {exhibit.scenario.digest}, seed stream {STREAM}.</small></p>
-<script type="text/plain" id="{name}-recording">{pack(exhibit.recording)}</script>
 </section>"""
 
 
 def _cells(number: int, attempt: Attempt) -> list[str]:
-    values = numbers_of(number, attempt)
-
-    def show(key: str, digits: int, scale: float = 1.0) -> str:
-        value = values[key]
-        return f"{scale * value:.{digits}f}" if isinstance(value, float) else "–"
-
+    """Returns a row of the table of attempts, in the order of `HEADS`."""
+    record, probability = attempt.record, attempt.selection.probability
+    figures = (
+        ("{:.1f}", record.duration_s),
+        ("{:.0f}", 1000.0 * record.min_distance),
+        ("{:.1f}", record.peak_force),
+    )
     return [
         str(number),
         describe_start(attempt.selection.start),
-        show("estimated_success", 0, 100.0),
-        attempt.record.outcome,
-        show("duration_s", 1),
-        show("min_distance_m", 0, 1000.0),
-        show("peak_force_N", 1),
+        "–" if probability is None else f"{100.0 * probability:.0f}",
+        record.outcome,
+        *("–" if math.isnan(value) else form.format(value) for form, value in figures),
     ]

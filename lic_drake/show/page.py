@@ -1,9 +1,14 @@
-"""HTML pages that need no network: pictures and recordings are inside them."""
+"""Self-contained HTML pages: pictures and recordings are embedded."""
 
 import base64
 import gzip
 import hashlib
 import html
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from lic_drake.errors import LicError
 
 UNPACK = (
     "async (text) => new Response(new Blob([Uint8Array.from(atob(text), c => c.charCodeAt(0))])"
@@ -22,21 +27,20 @@ figcaption, footer { color: #555; font-size: 0.9rem; }
 """
 
 
-def make_page(title: str, body: str, style: str = "", script: str = "") -> str:
+def make_page(title: str, body: str, style: str = "") -> str:
     """Returns a page.
 
     Args:
         title: Its title and heading, plain text.
         body: HTML.
         style: CSS in addition to that of all pages.
-        script: JavaScript that runs when the page is loaded.
     """
     heading = html.escape(title)
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{heading}</title>\n<style>{_STYLE}{style}</style>\n</head>\n<body>\n"
-        f"<h1>{heading}</h1>\n{body}\n<script>{script}</script>\n</body>\n</html>\n"
+        f"<h1>{heading}</h1>\n{body}\n</body>\n</html>\n"
     )
 
 
@@ -64,13 +68,45 @@ def pack(page: str) -> str:
     return base64.b64encode(gzip.compress(page.encode(), mtime=0)).decode("ascii")
 
 
-def embed(page: str, title: str = "recording", height_px: int = 480) -> str:
-    """Returns a frame that shows a page, as HTML, for other pages and notebooks."""
+def embed(page: str, title: str = "recording", height_px: int = 480, button: str = "") -> str:
+    """Returns a frame that shows a page, as HTML, for other pages and notebooks.
+
+    Args:
+        page: The page.
+        title: What it is, plain text.
+        height_px: Height of the frame.
+        button: Label of a button; the page is then shown only once that is pressed, or when the
+            address ends with `#` and the id of the section that holds the frame.
+    """
     packed = pack(page)
     name = "recording-" + hashlib.sha256(packed.encode()).hexdigest()[:12]
-    return (
+    show = (
+        f"() => ({UNPACK})('{packed}')"
+        f".then(page => document.getElementById('{name}').srcdoc = page)"
+    )
+    frame = (
         f'<iframe id="{name}" title="{html.escape(title)}"'
         f' style="width:100%;height:{height_px}px;border:0"></iframe>\n'
-        f"<script>({UNPACK})('{packed}')"
-        f".then(page => document.getElementById('{name}').srcdoc = page)</script>"
     )
+    if not button:
+        return f"{frame}<script>({show})()</script>"
+    return (
+        f'<button id="show-{name}">{html.escape(button)}</button>\n{frame}<script>\n'
+        f"{{const button = document.getElementById('show-{name}'), show = {show};\n"
+        "button.addEventListener('click', show);\n"
+        "if (location.hash.slice(1) === button.closest('section')?.id) show();}</script>"
+    )
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Turns what goes wrong while a file is written into one clear error.
+
+    Raises:
+        LicError: The file cannot be written.
+    """
+    try:
+        yield
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise LicError(f"cannot write {path}: {reason}") from None

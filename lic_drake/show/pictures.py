@@ -17,7 +17,6 @@ from lic_drake.show.figures import ShownTrial, save_figure
 from lic_drake.show.film import film_frames, save_film
 from lic_drake.show.page import embed, make_page, picture
 from lic_drake.show.recording import Recording
-from lic_drake.show.stage import in_plane
 from lic_drake.show.stills import save_stills
 from lic_drake.show.views import SIDE, TOP, draw_view
 from lic_drake.starts import BoardStarts, LineStarts
@@ -70,7 +69,7 @@ def save_pictures(
         files[kind] = out / name
         save_figure(figure, files[kind])
 
-    save("path", "path.png", _path_figure(trial))
+    save("path", "path.png", path_figure(trial))
     if isinstance(known, Observer):
         save("apertures", "apertures.png", maps_figure(selector, known, attempts))
         for number in range(1, len(attempts) + 1):
@@ -92,7 +91,7 @@ def save_pictures(
 def record_trial(trial: ShownTrial, drake_models: Path | None = None) -> Recording:
     """Returns a recording of all attempts; a PR2 moves base, torso and arm to each start."""
     scenario, instance = trial.scenario, trial.instance
-    approach = None if in_plane(scenario) else Approach(scenario, instance)
+    approach = None if scenario.arm().is_planar else Approach(scenario, instance)
     recording = Recording(scenario, instance, drake_models, approach)
     before: ReachTrace | None = None
     for trace in trial.traces:
@@ -105,9 +104,9 @@ def record_trial(trial: ShownTrial, drake_models: Path | None = None) -> Recordi
     return recording
 
 
-def _path_figure(trial: ShownTrial) -> Figure:
+def path_figure(trial: ShownTrial) -> Figure:
     """Returns views of all attempts from above and, in space, from the side."""
-    views = (TOP,) if in_plane(trial.scenario) else (TOP, SIDE)
+    views = (TOP,) if trial.scenario.arm().is_planar else (TOP, SIDE)
     figure = Figure(figsize=(7 * len(views), 7), layout="constrained")
     for ax, axes in zip(figure.subplots(1, len(views), squeeze=False)[0], views, strict=True):
         labelled = trial.labelled_traces()

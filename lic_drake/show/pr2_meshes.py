@@ -46,7 +46,7 @@ def find_drake_models() -> Path:
         ) from None
 
 
-def attach_pr2_meshes(scene: Scene, package: Path) -> list[Path]:
+def attach_pr2_meshes(scene: Scene, package: Path) -> None:
     """Attaches visual-only meshes in place of the links' shapes; collision geometry is unchanged.
 
     Gripper closed and head level, as in models/pr2/pr2.urdf.
@@ -55,50 +55,40 @@ def attach_pr2_meshes(scene: Scene, package: Path) -> list[Path]:
         scene: A scene with a PR2, not yet built into a diagram.
         package: The folder of package://drake_models.
 
-    Returns:
-        The files of the meshes.
-
     Raises:
         ModelError: The package has no PR2, or one that cannot be read.
     """
     path = package / DESCRIPTION
     source, source_graph = MultibodyPlant(time_step=0.0), SceneGraph()
     source.RegisterAsSourceForSceneGraph(source_graph)
+    parser = Parser(source)
+    packages = parser.package_map()
+    packages.Remove(PACKAGE)
+    packages.Add(PACKAGE, str(package))
     logger = logging.getLogger("drake")
     level = logger.level
     logger.setLevel(logging.CRITICAL)  # Drake warns of tags that it ignores.
     try:
-        _parse(source, path, package)
-        files = _move_meshes(scene, source, source_graph)
+        parser.AddModels(str(path))
+        source.Finalize()
+        num_meshes = _copy_meshes(scene, source, source_graph)
     except RuntimeError as error:
         reason = " ".join(str(error).split())
         raise ModelError(f"the PR2's meshes cannot be read from {path}: {reason}") from None
     finally:
         logger.setLevel(level)
-    if not files:
+    if num_meshes == 0:
         raise ModelError(f"{path} has no mesh for any link of models/pr2/pr2.urdf")
-    return files
 
 
-def _parse(plant: MultibodyPlant, path: Path, package: Path) -> None:
-    packages = PackageMap.MakeEmpty()
-    packages.Add(PACKAGE, str(package))
-    parser = Parser(plant)
-    parser.package_map().Remove(PACKAGE)
-    parser.package_map().AddMap(packages)
-    parser.AddModels(str(path))
-    plant.Finalize()
-
-
-def _move_meshes(scene: Scene, source: MultibodyPlant, source_graph: SceneGraph) -> list[Path]:
-    """Puts the meshes of a plant on the visible links of the scene's robot; returns their files."""
+def _copy_meshes(scene: Scene, source: MultibodyPlant, source_graph: SceneGraph) -> int:
+    """Copies a plant's meshes to the visible links of the scene's robot; returns their number."""
     context, inspector = source.CreateDefaultContext(), source_graph.model_inspector()
     joints = [source.get_joint(index) for index in source.GetJointIndices()]
     parents = {joint.child_body().name(): joint.parent_body().name() for joint in joints}
     source_id, frames = scene.plant.get_source_id(), _visible_links(scene)
     assert source_id is not None
-    meshed: set[str] = set()
-    files: list[Path] = []
+    scene_graph, meshed = scene.scene_graph, list[str]()
     for name in parents:
         link = name  # The nearest link towards the base that the scene's robot has, too.
         while link not in (*frames, *_HEAD_PARTS) and link in parents:
@@ -113,22 +103,19 @@ def _move_meshes(scene: Scene, source: MultibodyPlant, source_graph: SceneGraph)
             mesh = inspector.GetShape(old)
             if not isinstance(mesh, Mesh):  # Boxes of the source mark frames.
                 continue
+            X_LM = X_LB @ inspector.GetPoseInFrame(old)
+            instance = GeometryInstance(X_LM, mesh, f"mesh{len(meshed)}")
+            seen = inspector.GetIllustrationProperties(old)
+            rendered = inspector.GetPerceptionProperties(old)
+            assert seen is not None and rendered is not None
             if link not in meshed:
                 for role in (Role.kIllustration, Role.kPerception):
-                    scene.scene_graph.RemoveRole(source_id, frames[link], role)
-                meshed.add(link)
-            X_LM = X_LB @ inspector.GetPoseInFrame(old)
-            instance = GeometryInstance(X_LM, mesh, f"mesh{len(files)}")
-            new = scene.scene_graph.RegisterGeometry(source_id, frames[link], instance)
-            seen, rendered = (
-                inspector.GetIllustrationProperties(old),
-                inspector.GetPerceptionProperties(old),
-            )
-            assert seen is not None and rendered is not None
-            scene.scene_graph.AssignRole(source_id, new, seen)
-            scene.scene_graph.AssignRole(source_id, new, rendered)
-            files.append(Path(mesh.source().path()))
-    return files
+                    scene_graph.RemoveRole(source_id, frames[link], role)
+            new = scene_graph.RegisterGeometry(source_id, frames[link], instance)
+            scene_graph.AssignRole(source_id, new, seen)
+            scene_graph.AssignRole(source_id, new, rendered)
+            meshed.append(link)
+    return len(meshed)
 
 
 def _visible_links(scene: Scene) -> dict[str, FrameId]:

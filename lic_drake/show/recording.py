@@ -20,12 +20,11 @@ from pydrake.multibody.meshcat import ContactVisualizer, ContactVisualizerParams
 from pydrake.systems.framework import DiagramBuilder
 
 from lic_drake.clutter.instance import ClutterInstance
-from lic_drake.errors import LicError
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.show.approach import Approach
-from lic_drake.show.page import embed
-from lic_drake.show.stage import Stage, in_plane, place
+from lic_drake.show.page import embed, writing
+from lic_drake.show.stage import add_stage, place
 from lic_drake.types import Vector
 
 PAUSE_S = 1.0
@@ -78,20 +77,11 @@ class Recording:
         self._scenario, self._approach = scenario, approach
         self._meshcat = _make_meshcat()
         builder = DiagramBuilder()
-        self._stage = Stage(builder, scenario, instance, drake_models)
-        scene = self._stage.scene
-        MeshcatVisualizer.AddToBuilder(
-            builder,
-            scene.scene_graph,
-            self._meshcat,
-            MeshcatVisualizerParams(role=Role.kIllustration),
-        )
-        ContactVisualizer.AddToBuilder(
-            builder,
-            scene.plant,
-            self._meshcat,
-            ContactVisualizerParams(newtons_per_meter=50.0, force_threshold=0.05, radius=0.003),
-        )
+        self._scene = scene = add_stage(builder, scenario, instance, drake_models)
+        shown = MeshcatVisualizerParams(role=Role.kIllustration)
+        MeshcatVisualizer.AddToBuilder(builder, scene.scene_graph, self._meshcat, shown)
+        arrows = ContactVisualizerParams(newtons_per_meter=50.0, force_threshold=0.05, radius=0.003)
+        ContactVisualizer.AddToBuilder(builder, scene.plant, self._meshcat, arrows)
         self._diagram = builder.Build()
         self._context = self._diagram.CreateDefaultContext()
         self._frames_per_second = frame_rate(scenario.mpc.rate_hz)
@@ -151,10 +141,8 @@ class Recording:
         Raises:
             LicError: The file cannot be written.
         """
-        try:
+        with writing(path):
             path.write_text(self.html(), encoding="utf-8")
-        except OSError as error:
-            raise LicError(f"cannot write {path}: {error.strerror}") from None
 
     def _repr_html_(self) -> str:
         """Returns the recording in a frame; notebooks call this."""
@@ -193,7 +181,7 @@ class Recording:
         if state is not None:
             self._q = state.q
         shown = state if with_clutter else None
-        place(self._stage.scene, self._context, self._b0, self._q, shown)
+        place(self._scene, self._context, self._b0, self._q, shown)
         self._context.SetTime(self._clock_s)
         self._diagram.ForcedPublish(self._context)
 
@@ -202,33 +190,21 @@ class Recording:
         self._meshcat.SetProperty(_FORCES, "visible", visible, self._clock_s)
 
     def _set_up_view(self) -> None:
-        planar = in_plane(self._scenario)
         for end in ("top_color", "bottom_color"):
             self._meshcat.SetProperty("/Background/<object>", end, [0.97, 0.97, 0.98])
         for hidden in ("/Grid", "/Axes"):
             self._meshcat.SetProperty(hidden, "visible", False)
+        planar = self._scenario.arm().is_planar
         self._meshcat.SetCameraPose(*(_PLANE_VIEW if planar else _SPACE_VIEW))
         self._meshcat.StartRecording(
             TICKS_PER_FRAME * self._frames_per_second, set_visualizations_while_recording=False
         )
-        if planar:
-            self._draw_start_line()
 
     def _draw_goal(self, p_WG: Vector) -> None:
         radius = self._scenario.stop.success_distance_m
         for name, shape in (("goal", Sphere(radius)), ("pole", Cylinder(0.002, 0.3))):
             self._meshcat.SetObject(f"/task/{name}", shape, _TASK_COLOR)
             self._meshcat.SetTransform(f"/task/{name}", RigidTransform(p_WG))
-
-    def _draw_start_line(self) -> None:
-        """Draws where the hand may start, green, or, with a mobile base, where that may, blue."""
-        line, track = self._scenario.task.start_line, self._scenario.task.base
-        if track is None:
-            ends = np.array([[line.x_m, line.y_min_m, -0.1], [line.x_m, line.y_max_m, -0.1]])
-            self._meshcat.SetLine("/task/start_line", ends.T, 3.0, Rgba(0.1, 0.65, 0.2, 1.0))
-        else:
-            ends = np.array([[0.0, track.y_min_m, -0.1], [0.0, track.y_max_m, -0.1]])
-            self._meshcat.SetLine("/task/base_track", ends.T, 3.0, Rgba(0.1, 0.3, 0.8, 1.0))
 
 
 def frame_rate(control_rate_hz: float) -> float:

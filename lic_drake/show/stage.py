@@ -14,42 +14,30 @@ from lic_drake.show.pr2_meshes import attach_pr2_meshes
 from lic_drake.types import Vector
 
 
-def in_plane(scenario: Scenario) -> bool:
-    """Returns whether the robot is an arm in the plane."""
-    return scenario.arm().is_planar
-
-
-class Stage:
-    """Plant and scene graph of an environment with a robot whose base and torso can be placed.
+def add_stage(
+    builder: DiagramBuilder,
+    scenario: Scenario,
+    instance: ClutterInstance,
+    drake_models: Path | None = None,
+) -> Scene:
+    """Adds plant and scene graph of an environment with a robot that `place` can place.
 
     Contact forces follow from the state alone, since the plant is continuous.
 
-    Attributes:
-        scene: The scene.
-        meshes: Files of the robot's meshes.
+    Args:
+        builder: Gets plant and scene graph.
+        scenario: Robot and contact.
+        instance: The environment.
+        drake_models: Folder of package://drake_models, to show a PR2 in its meshes.
+
+    Raises:
+        ModelError: The meshes cannot be read.
     """
-
-    def __init__(
-        self,
-        builder: DiagramBuilder,
-        scenario: Scenario,
-        instance: ClutterInstance,
-        drake_models: Path | None = None,
-    ) -> None:
-        """Adds the scene to a builder.
-
-        Args:
-            builder: Gets plant and scene graph.
-            scenario: Robot and contact.
-            instance: The environment.
-            drake_models: Folder of package://drake_models, to show a PR2 in its meshes.
-
-        Raises:
-            ModelError: The meshes cannot be read.
-        """
-        config = replace(scenario.scene, time_step_s=0.0)
-        self.scene = add_scene(builder, scenario.arm(), instance, config, visuals=True, mobile=True)
-        self.meshes = [] if drake_models is None else attach_pr2_meshes(self.scene, drake_models)
+    config = replace(scenario.scene, time_step_s=0.0)
+    scene = add_scene(builder, scenario.arm(), instance, config, visuals=True, mobile=True)
+    if drake_models is not None:
+        attach_pr2_meshes(scene, drake_models)
+    return scene
 
 
 def place(

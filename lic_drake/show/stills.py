@@ -11,6 +11,7 @@ from pydrake.multibody.plant import ContactResults
 from pydrake.systems.framework import DiagramBuilder
 
 from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.control.tactile_sensor import read_patches
 from lic_drake.errors import RenderingError
 from lic_drake.perception.cameras import (
     RENDERER,
@@ -26,7 +27,7 @@ from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.trace import SceneState
 from lic_drake.show.detections import draw_image
 from lic_drake.show.figures import ShownTrial, save_figure
-from lic_drake.show.stage import Stage, in_plane, place
+from lic_drake.show.stage import add_stage, place
 from lic_drake.types import Vector
 
 CAMERA = CameraConfig(width=1280, height=960, focal_px=1100.0)
@@ -50,19 +51,15 @@ LEAST_FORCE_N = 0.05
 _FLOOR_IN_PLANE_M = -0.13
 
 
-class View(NamedTuple):
-    """Position and target of a camera, (x, y, z), metres."""
+type View = tuple[tuple[float, float, float], tuple[float, float, float]]
+"""Position and target of a camera, (x, y, z), metres."""
 
-    p_WC: tuple[float, float, float]
-    target: tuple[float, float, float]
-
-
-PLANAR_VIEWS = {"": View((-0.45, -0.62, 0.95), (0.46, 0.0, -0.08))}
+PLANAR_VIEWS: dict[str, View] = {"": ((-0.45, -0.62, 0.95), (0.46, 0.0, -0.08))}
 """From behind and above, to the right."""
 
-SPATIAL_VIEWS = {
-    "": View((-0.75, -2.25, 1.75), (0.22, -0.05, 0.78)),
-    "inside": View((1.8, -1.0, 1.75), (0.55, -0.12, 1.0)),
+SPATIAL_VIEWS: dict[str, View] = {
+    "": ((-0.75, -2.25, 1.75), (0.22, -0.05, 0.78)),
+    "inside": ((1.8, -1.0, 1.75), (0.55, -0.12, 1.0)),
 }
 """Robot, board and clutter from the right; the clutter from behind the board."""
 
@@ -102,21 +99,21 @@ class StillCamera:
         Raises:
             RenderingError: The renderer does not work on this machine, or not with these meshes.
         """
-        make_renderer()  # Whether it works at all, before anything is built.
         builder = DiagramBuilder()
-        self._stage = Stage(builder, scenario, instance, drake_models)
-        scene_graph = self._stage.scene.scene_graph
-        has_gltf = any(path.suffix == ".gltf" for path in self._stage.meshes)
+        self._scene = add_stage(builder, scenario, instance, drake_models)
+        scene_graph = self._scene.scene_graph
         try:
-            scene_graph.AddRenderer(RENDERER, make_renderer(_lamps(has_gltf)))
+            renderer = make_renderer(_lamps(2.5 if drake_models else 1.0))
+            scene_graph.AddRenderer(RENDERER, renderer)
         except RuntimeError as error:  # It loads the meshes now.
             raise RenderingError(f"a mesh cannot be rendered: {error}") from None
-        floor_m = _FLOOR_IN_PLANE_M if in_plane(scenario) else 0.0
+        planar = scenario.arm().is_planar
+        floor_m = _FLOOR_IN_PLANE_M if planar else 0.0
         p_WF = np.array([0.0, 0.0, floor_m - 0.01])
         add_prop(scene_graph, "floor", Box(12.0, 12.0, 0.02), p_WF, FLOOR_COLOR)
         radius = scenario.stop.success_distance_m
         add_prop(scene_graph, "goal", Sphere(radius), p_WG, GOAL_COLOR)
-        self.views = PLANAR_VIEWS if in_plane(scenario) else SPATIAL_VIEWS
+        self.views = PLANAR_VIEWS if planar else SPATIAL_VIEWS
         self._sensors = {
             name: add_camera(builder, scene_graph, f"{name}_camera", CAMERA, look_at(*view))
             for name, view in self.views.items()
@@ -132,7 +129,7 @@ class StillCamera:
             b0: Base position and torso height, shape (3,), metres.
             state: State of arm and clutter.
         """
-        place(self._stage.scene, self._context, b0, state.q, state)
+        place(self._scene, self._context, b0, state.q, state)
         X_WC = look_at(*self.views[view])
         image = CameraImage(
             color=take_color_image(self._sensors[view], self._context),
@@ -144,22 +141,14 @@ class StillCamera:
         return Still(image, *self._forces())
 
     def _forces(self) -> tuple[Vector, Vector]:
-        """Returns points of application of the forces on the skin, and the forces."""
-        plant, skin = self._stage.scene.plant, self._stage.scene.skin_links
+        """Returns the centres of pressure on the skin and the normal forces there."""
+        plant, skin = self._scene.plant, self._scene.skin_links
         port = plant.get_contact_results_output_port()
         results = cast(ContactResults, port.Eval(plant.GetMyContextFromRoot(self._context)))
-        contacts = []  # The two geometries, the point, and the force on the first one.
-        for i in range(results.num_hydroelastic_contacts()):
-            patch = results.hydroelastic_contact_info(i)
-            surface, force = patch.contact_surface(), patch.F_Ac_W().translational()
-            contacts.append((surface.id_M(), surface.id_N(), surface.centroid(), force))
-        for i in range(results.num_point_pair_contacts()):
-            pair = results.point_pair_contact_info(i)
-            ids, force = pair.point_pair(), pair.contact_force()
-            contacts.append((ids.id_B, ids.id_A, pair.contact_point(), force))
-        on_skin = [c for c in contacts if c[0] in skin or c[1] in skin]
-        forces = [force if first in skin else -force for first, _, _, force in on_skin]
-        return np.reshape([c[2] for c in on_skin], (-1, 3)), np.reshape(forces, (-1, 3))
+        contacts = [c for c in read_patches(results, skin.get) if c.force.sum() > 0.0]
+        p_WC = [np.average(c.p_RQ, axis=0, weights=c.force) for c in contacts]
+        f_W = [-c.force @ c.n_R for c in contacts]
+        return np.reshape(p_WC, (-1, 3)), np.reshape(f_W, (-1, 3))
 
 
 def save_stills(
@@ -229,14 +218,11 @@ def draw_still(still: Still, caption: str) -> Figure:
     return figure
 
 
-def _lamps(physical: bool) -> list[LightParameter]:
+def _lamps(strength: float) -> list[LightParameter]:
     """Returns a lamp behind and above the robot, and one at the camera.
 
-    Args:
-        physical: Whether a mesh has materials for which VTK computes light physically, which needs
-            stronger lamps.
+    VTK computes light physically for the meshes' materials, which takes stronger lamps.
     """
-    strength = 2.5 if physical else 1.0
     return [
         LightParameter(type="directional", frame=frame, direction=direction, intensity=intensity)
         for frame, direction, intensity in (

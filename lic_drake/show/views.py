@@ -16,7 +16,6 @@ from lic_drake.reach.trace import ReachTrace
 from lic_drake.robots.arm import Arm
 from lic_drake.scene.looks import FIXED_COLOR, MOVABLE_COLOR, STEM_COLOR
 from lic_drake.show.figures import ATTEMPT_COLORS
-from lic_drake.show.stage import in_plane
 from lic_drake.starts import make_starts
 from lic_drake.types import Vector
 
@@ -57,13 +56,13 @@ def draw_view(
         attempts: Labels and traces of the reaches.
         axes: From where to look.
     """
-    _draw_objects(ax, instance, axes, 1.0 if in_plane(scenario) else 0.6)
+    _draw_objects(ax, instance, axes, 1.0 if scenario.arm().is_planar else 0.6)
     _draw_starts(ax, make_starts(scenario, instance).grid, axes)
     for i, (label, trace) in enumerate(attempts):
         if not trace.q:
             continue
         color = ATTEMPT_COLORS[i % len(ATTEMPT_COLORS)]
-        if in_plane(scenario):  # Before a board, the PR2's thick links would hide everything.
+        if scenario.arm().is_planar:  # Before a board, the PR2's thick links would hide everything.
             for q, alpha in ((trace.q[0], 0.25), (trace.q[-1], 0.8)):
                 _draw_arm(ax, scenario.arm(), q, trace.p_WR, axes, color, alpha)
         path = np.array(trace.p_WE)[:, list(axes)]
@@ -139,8 +138,8 @@ def _outline(instance: ClutterInstance, i: int, axes: PlotAxes) -> Patch:
 
 def _draw_starts(ax: Axes, starts: Starts, axes: PlotAxes) -> None:
     """Marks where the hand may start, green, and where a mobile base may be, blue."""
-    in_plane = np.column_stack([starts.x0[:, :2], np.zeros(len(starts))])
-    hand = in_plane if starts.x0.shape[1] == 3 else starts.x0[:, :3]
+    flat = np.column_stack([starts.x0[:, :2], np.zeros(len(starts))])
+    hand = flat if starts.x0.shape[1] == 3 else starts.x0[:, :3]
     for name, points, color in (("hand", hand, "tab:green"), ("base", starts.b0, "tab:blue")):
         places = np.unique(points[:, list(axes)].round(6), axis=0)
         if name == "hand" or (len(places) > 1 and axes == TOP):
@@ -175,7 +174,7 @@ def _draw_goal(ax: Axes, scenario: Scenario, p_WG: Vector, axes: PlotAxes) -> No
     ax.add_patch(Circle((x, y), radius, color="tab:cyan", zorder=5, gid="goal"))
     names = [f"{'xyz'[axis]} [m]" for axis in axes]
     ax.set(xlabel=names[0], ylabel=names[1], aspect="equal")
-    if in_plane(scenario) and axes == TOP:
+    if scenario.arm().is_planar and axes == TOP:
         low, high = _WORKSPACE
         ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     else:

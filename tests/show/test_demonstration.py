@@ -95,7 +95,6 @@ def test_a_second_attempt_starts_elsewhere_and_the_pictures_are_the_new_ones_onl
     said = [line for line in lines if "starts at y" in line]
     for attempt, line in zip(result.attempts, said, strict=True):
         assert f"base at y {attempt.selection.start.b0[1]:+.3f} m" in line
-    assert b"base_track" in messages_of(result.files["recording"])
 
 
 def test_a_pr2_shows_what_it_did_in_drakes_meshes(

@@ -41,7 +41,7 @@ def test_the_page_holds_everything_and_needs_nothing(exhibits: list[Exhibit]) ->
     sources = re.findall(r'\b(?:src|href)\s*=\s*"?([^\s">]{1,30})', page)
     assert sources and all(source.startswith("data:image/png;base64,") for source in sources)
     assert not re.search(r"https?://|@import|url\(", page)
-    packed = re.findall(r'<script type="text/plain"[^>]*>([^<]*)</script>', page)
+    packed = re.findall(r"'([\w+/]{100,}=*)'", page)
     pages = [gzip.decompress(b64decode(text)).decode() for text in packed]
     assert pages == [exhibit.recording for exhibit in exhibits]
     views = [b64decode(text) for text in re.findall(r"png;base64,([^\"]*)", page)]
@@ -74,8 +74,8 @@ def test_pages_escape_text_and_hold_what_they_are_given() -> None:
     assert packed == pack(page)
     assert not re.search(r"(src|href)\s*=", text)
     assert 'title="a &lt;reach&gt;"' in text
-    whole = make_page("a < b", picture(b"\x89PNG", "image/png", "c > d"), "x {}", "f()")
-    for part in ("<h1>a &lt; b</h1>", "c &gt; d</figcaption>", "x {}</style>", ">f()</script>"):
+    whole = make_page("a < b", picture(b"\x89PNG", "image/png", "c > d"), "x {}")
+    for part in ("<h1>a &lt; b</h1>", "c &gt; d</figcaption>", "x {}</style>"):
         assert part in whole
 
 
