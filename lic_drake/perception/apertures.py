@@ -6,7 +6,8 @@ import numpy as np
 from scipy.ndimage import map_coordinates, uniform_filter
 from scipy.special import ndtr
 
-from lic_drake.perception.board_grid import BoardGrid, BoardModel, fit_grid
+from lic_drake.clutter.board import ApertureBoard
+from lic_drake.perception.board_grid import BoardGrid, fit_grid
 from lic_drake.perception.board_plane import BoardPlane, find_board_plane
 from lic_drake.perception.config import CameraConfig
 from lic_drake.perception.image import CameraImage
@@ -68,7 +69,7 @@ class DetectedApertures:
 
 
 def find_apertures(
-    image: CameraImage, camera: CameraConfig, board: BoardModel
+    image: CameraImage, camera: CameraConfig, board: ApertureBoard
 ) -> DetectedApertures:
     """Finds the board and looks into its apertures.
 
@@ -77,7 +78,7 @@ def find_apertures(
     Args:
         image: What the camera sees.
         camera: Gives the errors of depths and of the camera's pose.
-        board: What is known of the board.
+        board: Gives rows, columns and spacing, which is all that is known beforehand.
 
     Raises:
         PerceptionError: There is no such board in view.
@@ -118,7 +119,7 @@ class _BoardView:
         self._behind = plane.depth_behind(image)
         self._covers = _covers(self._behind)
 
-    def fit(self, board: BoardModel) -> BoardGrid:
+    def fit(self, board: ApertureBoard) -> BoardGrid:
         """Returns the grid of bars."""
         eye = self.plane.p_BC * [-1.0, 1.0, 1.0]
         return fit_grid(

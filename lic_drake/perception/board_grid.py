@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.signal import correlate
 
-from lic_drake.config import check_numbers
+from lic_drake.clutter.board import ApertureBoard
 from lic_drake.errors import PerceptionError
 from lic_drake.types import Vector
 
@@ -33,41 +33,18 @@ _CORRELATED = 20
 
 
 @dataclass(frozen=True, kw_only=True)
-class BoardModel:
-    """What is known of the board beforehand.
-
-    Attributes:
-        rows: Number of rows of apertures.
-        columns: Number of columns.
-        aperture_m: Distance between the centres of neighbouring apertures, metres.
-    """
-
-    rows: int = 4
-    columns: int = 5
-    aperture_m: float = 0.2
-
-    def __post_init__(self) -> None:
-        check_numbers(self, positive=("rows", "columns", "aperture_m"))
-
-    @property
-    def counts(self) -> Vector:
-        """Numbers of apertures across and up, shape (2,)."""
-        return np.array([self.columns, self.rows])
-
-
-@dataclass(frozen=True, kw_only=True)
 class BoardGrid:
     """Where the bars are in the board's plane, (y, z) from the plane's origin.
 
     Attributes:
-        model: Rows, columns and spacing.
+        board: Gives rows, columns and spacing only; the rest is measured.
         centre: The board's centre, shape (2,), metres.
         angle: Rotation of the board in its plane, from y to z, radians.
         bar_m: Width of the bars, metres.
         covariance: Of centre, angle and bar_m, shape (4, 4).
     """
 
-    model: BoardModel
+    board: ApertureBoard
     centre: Vector
     angle: float
     bar_m: float
@@ -75,13 +52,13 @@ class BoardGrid:
 
     def cell_centres(self) -> Vector:
         """Returns the apertures' centres in the board's own axes, shape (n, 2), metres."""
-        y, z = (np.arange(n) - 0.5 * (n - 1) for n in self.model.counts)
-        return self.model.aperture_m * np.array([[yi, zi] for zi in z for yi in y])
+        y, z = (np.arange(n) - 0.5 * (n - 1) for n in _counts(self.board))
+        return self.board.aperture_m * np.array([[yi, zi] for zi in z for yi in y])
 
     def bar_points(self, step_m: float) -> Vector:
         """Returns points on the middle lines of the bars, in the board's own axes, shape (n, 2)."""
-        half = 0.5 * self.model.aperture_m * self.model.counts
-        lines = [np.linspace(-h, h, n + 1) for h, n in zip(half, self.model.counts, strict=True)]
+        half = 0.5 * self.board.aperture_m * _counts(self.board)
+        lines = [np.linspace(-h, h, n + 1) for h, n in zip(half, _counts(self.board), strict=True)]
         along = [np.arange(-h, h, step_m) for h in half]
         upright = np.stack(np.meshgrid(lines[0], along[1]), axis=-1).reshape(-1, 2)
         level = np.stack(np.meshgrid(along[0], lines[1]), axis=-1).reshape(-1, 2)
@@ -104,7 +81,7 @@ class BoardGrid:
 
 def fit_grid(
     look: Callable[[Vector, Vector], Vector],
-    board: BoardModel,
+    board: ApertureBoard,
     extent: Vector,
     eye: Vector,
     resolution_m: float,
@@ -114,7 +91,7 @@ def fit_grid(
     Args:
         look: Returns for points (y, z) of the plane 1 where there is wood or a cover, 0 where there
             is neither, NaN where they are not seen.
-        board: What is known of the board.
+        board: Gives rows, columns and spacing, which is all that is known beforehand.
         extent: Where to look: least and greatest (y, z), shape (2, 2), metres.
         eye: The camera's distance from the plane and its (y, z), shape (3,), metres.
         resolution_m: Distance of the points at which to look, metres.
@@ -122,7 +99,7 @@ def fit_grid(
     Raises:
         PerceptionError: There is no such grid.
     """
-    size = board.counts * board.aperture_m
+    size = _counts(board) * board.aperture_m
     # Leaves room for a board that is partly out of view, and for its surroundings.
     margin = np.maximum(size - (extent[1] - extent[0]), 0.0) + board.aperture_m
     y, z = (
@@ -145,12 +122,17 @@ def fit_grid(
     for _ in range(2):  # The second time with gates around the first result.
         guess, covariance = _refine(guess, edges, board, eye)
     return BoardGrid(
-        model=board,
+        board=board,
         centre=guess[:2],
         angle=float(guess[2]),
         bar_m=float(guess[3]),
         covariance=covariance,
     )
+
+
+def _counts(board: ApertureBoard) -> Vector:
+    """Returns the numbers of apertures across and up, shape (2,)."""
+    return np.array([board.columns, board.rows])
 
 
 def _template(size: Vector, aperture_m: float, resolution_m: float) -> Vector:
@@ -180,19 +162,19 @@ def _edges(seen: Vector, y: Vector, z: Vector) -> tuple[Vector, Vector]:
 
 
 def _refine(
-    guess: Vector, edges: tuple[Vector, Vector], board: BoardModel, eye: Vector
+    guess: Vector, edges: tuple[Vector, Vector], board: ApertureBoard, eye: Vector
 ) -> tuple[Vector, Vector]:
     """Returns centre, angle and bar width by the edges near a guess, and their covariance."""
     lines: list[Vector] = []
     sides: list[Vector] = []
     points: list[Vector] = []
-    for axis, (found, count) in enumerate(zip(edges, board.counts, strict=True)):
+    for axis, (found, count) in enumerate(zip(edges, _counts(board), strict=True)):
         at = _to_board(guess, found[:, :2])
         bars = board.aperture_m * (np.arange(count + 1, dtype=np.float64) - 0.5 * count)
         nearest = np.argmin(np.abs(at[:, axis, np.newaxis] - bars), axis=1)
         off = at[:, axis] - _seen_edges(guess, bars[nearest], found[:, 2], eye, axis)
         # Near crossings the edges belong to the other bar.
-        across, other_count = at[:, 1 - axis], board.counts[1 - axis]
+        across, other_count = at[:, 1 - axis], _counts(board)[1 - axis]
         in_cell = (across / board.aperture_m + 0.5 * other_count) % 1.0
         within = np.abs(across) < 0.5 * board.aperture_m * other_count
         good = (np.abs(off) < GATE_M) & (np.abs(in_cell - 0.5) < 0.4) & within

@@ -11,13 +11,13 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
 from pydrake.systems.sensors import ImageDepth32F, ImageRgba8U, RgbdSensor
 
+from lic_drake.clutter.board import ApertureBoard
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.perception.apertures import DetectedApertures, find_apertures
-from lic_drake.perception.board_grid import BoardModel
 from lic_drake.perception.cameras import add_cameras, camera_image
 from lic_drake.perception.config import CameraConfig, CamerasConfig
 from lic_drake.perception.goal import DetectedGoal, find_goal
-from lic_drake.perception.image import CameraImage, Views
+from lic_drake.perception.image import CameraImage
 from lic_drake.perception.noise import disturbed_image
 from lic_drake.types import Vector
 from lic_drake.weak_method import weakly
@@ -34,12 +34,14 @@ class Look:
     """What the robot saw and detected.
 
     Attributes:
-        views: The images, with their errors.
+        head: The image from the PR2's head, with its errors.
+        external: The image from the camera that sees the goal, with its errors.
         apertures: What was detected in the head camera's image.
         goal: What was detected in the external camera's image.
     """
 
-    views: Views
+    head: CameraImage
+    external: CameraImage
     apertures: DetectedApertures
     goal: DetectedGoal
 
@@ -61,7 +63,7 @@ class CameraStation:
         instance: ClutterInstance,
         p_WG: Vector,
         cameras: CamerasConfig,
-        board: BoardModel,
+        board: ApertureBoard,
         make_rng: Callable[[int], np.random.Generator],
     ) -> None:
         """Builds the diagram.
@@ -70,7 +72,7 @@ class CameraStation:
             instance: The environment.
             p_WG: True position of the ball, shape (3,), metres.
             cameras: The cameras.
-            board: What the robot knows of the board beforehand.
+            board: Gives rows, columns and spacing, which the robot knows beforehand.
             make_rng: Returns the source of errors number `NUM_CAMERAS` * look + camera.
 
         Raises:
@@ -103,10 +105,8 @@ class CameraStation:
         """
         self.diagram.GetInputPort("look").FixValue(self._context, float(number))
         return Look(
-            views=Views(
-                head=cast(CameraImage, self._output("head_image")),
-                external=cast(CameraImage, self._output("external_image")),
-            ),
+            head=cast(CameraImage, self._output("head_image")),
+            external=cast(CameraImage, self._output("external_image")),
             apertures=cast(DetectedApertures, self._output("apertures")),
             goal=cast(DetectedGoal, self._output("goal")),
         )
@@ -145,12 +145,10 @@ class DisturbedCamera(LeafSystem):
 
     def _calc_image(self, context: Context, output: AbstractValue) -> None:
         look = int(np.asarray(self.GetInputPort("look").Eval(context))[0])
-        exact = camera_image(
-            cast(ImageRgba8U, self.GetInputPort("color_image").Eval(context)),
-            cast(ImageDepth32F, self.GetInputPort("depth_image").Eval(context)),
-            cast(RigidTransform, self.GetInputPort("body_pose_in_world").Eval(context)),
-            self._config.focal_px,
-        )
+        rgba = cast(ImageRgba8U, self.GetInputPort("color_image").Eval(context))
+        depth = cast(ImageDepth32F, self.GetInputPort("depth_image").Eval(context))
+        X_WC = cast(RigidTransform, self.GetInputPort("body_pose_in_world").Eval(context))
+        exact = camera_image(rgba, depth, X_WC, self._config.focal_px)
         output.set_value(disturbed_image(exact, self._config, self._make_rng(look)))
 
 

@@ -35,7 +35,7 @@ from pydrake.systems.sensors import CameraInfo, ImageDepth32F, ImageRgba8U, Rgbd
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import RenderingError
 from lic_drake.perception.config import CameraConfig, CamerasConfig
-from lic_drake.perception.image import CameraImage, Views
+from lic_drake.perception.image import CameraImage
 from lic_drake.robots.pr2 import HEAD_CAMERA, RIGHT_ARM_AT_REST, make_pr2
 from lic_drake.scene.scene import Scene, SceneConfig, add_scene
 from lic_drake.types import Vector
@@ -138,40 +138,6 @@ def add_cameras(
             builder, scene_graph, "head", head.camera, mount.GetFixedPoseInBodyFrame(), parent
         ),
         external=add_camera(builder, scene_graph, "external", external.camera, X_WC),
-    )
-
-
-def take_views(instance: ClutterInstance, p_WG: Vector, cameras: CamerasConfig) -> Views:
-    """Returns exact images of an environment with a ball at the goal, before the robot reaches.
-
-    `lic_drake.perception.noise.disturbed_views` adds the errors.
-
-    Args:
-        instance: The environment.
-        p_WG: The goal, shape (3,), metres.
-        cameras: The cameras.
-
-    Raises:
-        RenderingError: The renderer does not work on this machine.
-    """
-    builder = DiagramBuilder()
-    rig = add_cameras(builder, instance, p_WG, cameras)
-    diagram = builder.Build()
-    root = diagram.CreateDefaultContext()
-    rig.set_looking_posture(root)
-    return Views(
-        head=_take(rig.head, root, cameras.head.camera),
-        external=_take(rig.external, root, cameras.external.camera),
-    )
-
-
-def _take(sensor: RgbdSensor, root: Context, config: CameraConfig) -> CameraImage:
-    context = sensor.GetMyContextFromRoot(root)
-    return camera_image(
-        cast(ImageRgba8U, sensor.color_image_output_port().Eval(context)),
-        cast(ImageDepth32F, sensor.depth_image_32F_output_port().Eval(context)),
-        cast(RigidTransform, sensor.body_pose_in_world_output_port().Eval(context)),
-        config.focal_px,
     )
 
 

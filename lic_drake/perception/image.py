@@ -1,7 +1,6 @@
 """`CameraImage`: colours and depths, and the pose that the robot believes its camera to have."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,15 +59,3 @@ class CameraImage:
         height, width = self.shape
         centre = np.array([0.5 * width - 0.5, 0.5 * height - 0.5])
         return np.asarray(self.focal_px * p_CQ[..., :2] / p_CQ[..., 2:] + centre)
-
-
-class Views(NamedTuple):
-    """Images of an environment.
-
-    Attributes:
-        head: From the PR2's head.
-        external: From the camera that sees the goal.
-    """
-
-    head: CameraImage
-    external: CameraImage

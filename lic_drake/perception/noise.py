@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.spatial.transform import Rotation
 
-from lic_drake.perception.config import CameraConfig, CamerasConfig, NoiseConfig, PoseErrorConfig
-from lic_drake.perception.image import CameraImage, Views
+from lic_drake.perception.config import CameraConfig, NoiseConfig, PoseErrorConfig
+from lic_drake.perception.image import CameraImage
 from lic_drake.types import Vector
 
 _FAR_M = 1e6
@@ -66,14 +66,6 @@ def disturbed_image(
         depth=add_depth_noise(image.depth, config.noise, rng),
         R_WC=image.R_WC @ R,
         p_WC=image.p_WC + image.R_WC @ p,
-    )
-
-
-def disturbed_views(views: Views, cameras: CamerasConfig, rng: np.random.Generator) -> Views:
-    """Returns both images with errors; see `disturbed_image`."""
-    return Views(
-        head=disturbed_image(views.head, cameras.head.camera, rng),
-        external=disturbed_image(views.external, cameras.external.camera, rng),
     )
 
 

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from lic_drake.clutter.board import ApertureBoard
 from lic_drake.errors import PerceptionError, ScenarioError
-from lic_drake.perception.board_grid import BoardModel
 from lic_drake.perception.camera_station import CameraStation, Look
 from lic_drake.perception.config import CamerasConfig
 from lic_drake.reach.request import ReachRecord
@@ -84,7 +83,7 @@ class Observer:
                     self.scenario.sample_instance(self.stream, self.environment),
                     self.p_WG,
                     self.cameras,
-                    board_of(self.scenario)[1],
+                    board_of(self.scenario),
                     partial(make_generator, self.stream, "camera errors", self.environment),
                 )
             look = self._station.look(number)
@@ -98,8 +97,8 @@ class Observer:
         return record.success and distance <= self.cameras.ball_radius_m
 
 
-def board_of(scenario: Scenario) -> tuple[ApertureBoard, BoardModel]:
-    """Returns the board of a scenario, and what perception may know of it.
+def board_of(scenario: Scenario) -> ApertureBoard:
+    """Returns the board of a scenario.
 
     Raises:
         ScenarioError: It has none.
@@ -107,7 +106,7 @@ def board_of(scenario: Scenario) -> tuple[ApertureBoard, BoardModel]:
     board = scenario.clutter
     if not isinstance(board, ApertureBoard):
         raise ScenarioError(f"{scenario.category} has no board; use foliage-aperture-clutter")
-    return board, BoardModel(rows=board.rows, columns=board.columns, aperture_m=board.aperture_m)
+    return board
 
 
 def estimate_board(scenario: Scenario, look: Look, moves: bool = True) -> Belief:
@@ -124,7 +123,7 @@ def estimate_board(scenario: Scenario, look: Look, moves: bool = True) -> Belief
     Raises:
         PerceptionError: No aperture looks open, or the board is at an impossible place.
     """
-    board, _ = board_of(scenario)
+    board = board_of(scenario)
     found = look.apertures
     index = np.flatnonzero(found.probability_open > LEAST_PROBABILITY)
     if len(index) == 0:

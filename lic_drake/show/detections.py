@@ -45,10 +45,10 @@ def look_figure(
     look = observer.belief(number - 1).look
     figure = Figure(figsize=(15.0, 4.3), layout="constrained")
     seen, estimated, external = figure.subplots(1, 3)
-    draw_apertures(seen, look.views.head, look.apertures)
+    draw_apertures(seen, look.head, look.apertures)
     seen.set_title("head camera: probability of being open", fontsize=10)
     _draw_map(estimated, selector, observer, attempts, number)
-    draw_goal(external, look.views.external, look.goal, observer.cameras.ball_radius_m)
+    draw_goal(external, look.external, look.goal, observer.cameras.ball_radius_m)
     external.set_title(f"external camera: {external.get_title()}", fontsize=10)
     return figure
 
@@ -60,7 +60,7 @@ def _draw_map(
     belief, attempt = observer.belief(number - 1), attempts[number - 1]
     objective = selector.objective(situation_before(attempts, number, belief.starts))
     values = belief.over_all(estimate_apertures(objective, belief.starts))
-    image, found = belief.look.views.head, belief.look.apertures
+    image, found = belief.look.head, belief.look.apertures
     draw_image(ax, image)
     chosen = int(belief.index[nearest_aperture(belief.starts, attempt)])
     draw_probabilities(ax, image.project(found.corners), values, chosen)

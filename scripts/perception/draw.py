@@ -11,16 +11,15 @@ from matplotlib.figure import Figure
 from matplotlib.image import imsave
 
 from lic_drake.perception.apertures import find_apertures
-from lic_drake.perception.cameras import take_views
 from lic_drake.perception.config import load_cameras
 from lic_drake.perception.goal import find_goal
-from lic_drake.perception.noise import disturbed_views
 from lic_drake.perception.observer import board_of
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.seeds import make_generator
 from lic_drake.show.detections import draw_apertures, draw_goal
 from lic_drake.show.figures import save_figure
 from scripts.common import make_parser, run_script
+from scripts.perception.views import disturbed_views, take_views
 
 
 def main() -> None:
@@ -36,7 +35,7 @@ def main() -> None:
     rng = make_generator("calibration", "camera errors", args.scene)
     exact = take_views(instance, p_WG, cameras)
     views = disturbed_views(exact, cameras, rng)
-    _, board = board_of(scenario)
+    board = board_of(scenario)
     apertures = find_apertures(views.head, cameras.head.camera, board)
     goal = find_goal(views.external, cameras.external.camera, cameras.ball_radius_m)
     args.results.mkdir(parents=True, exist_ok=True)

@@ -11,15 +11,13 @@ from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import PerceptionError
 from lic_drake.intervals import wilson_interval
 from lic_drake.perception.apertures import STATES, find_apertures
-from lic_drake.perception.cameras import take_views
 from lic_drake.perception.config import CamerasConfig
 from lic_drake.perception.goal import find_goal
-from lic_drake.perception.image import Views
-from lic_drake.perception.noise import disturbed_views
 from lic_drake.perception.observer import board_of
 from lic_drake.reach.scenario import Scenario
 from lic_drake.seeds import make_generator
 from lic_drake.types import Vector
+from scripts.perception.views import Views, disturbed_views, take_views
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,12 +106,12 @@ def _aperture_errors(
     scene: int,
     noise: bool,
 ) -> list[ApertureError]:
-    board, model = board_of(scenario)
+    board = board_of(scenario)
     truth = true_states(board, instance)
     states, probability = ("unseen",) * len(truth), np.full(len(truth), 0.5)
     error = chi_squared = np.full(len(truth), np.nan)
     with suppress(PerceptionError):
-        found = find_apertures(views.head, cameras.head.camera, model)
+        found = find_apertures(views.head, cameras.head.camera, board)
         states, probability = found.states, found.probability_open
         off = found.p_WA - board.aperture_centres()
         error = np.linalg.norm(off, axis=1)

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from support.ray_casting import OTHER, blank, draw_boxes, draw_instance, tilted
 
+from lic_drake.clutter.board import ApertureBoard
 from lic_drake.clutter.foliage import FoliageApertureClutter
 from lic_drake.clutter.instance import ClutterInstance
-from lic_drake.errors import PerceptionError, ScenarioError
+from lic_drake.errors import PerceptionError
 from lic_drake.perception.apertures import DetectedApertures, find_apertures
-from lic_drake.perception.board_grid import BoardModel
 from lic_drake.perception.config import CameraConfig, PoseErrorConfig
 from lic_drake.perception.image import CameraImage
 from lic_drake.perception.noise import disturbed_image
@@ -36,8 +36,14 @@ def look(
 
 
 def find(image: CameraImage, clutter: FoliageApertureClutter = BARE) -> DetectedApertures:
-    model = BoardModel(rows=clutter.rows, columns=clutter.columns, aperture_m=clutter.aperture_m)
-    return find_apertures(image, CAMERA, model)
+    # Nothing of the board is used but its rows, columns and spacing.
+    known = ApertureBoard(
+        board_centre=[9.0, 9.0, 9.0],
+        rows=clutter.rows,
+        columns=clutter.columns,
+        aperture_m=clutter.aperture_m,
+    )
+    return find_apertures(image, CAMERA, known)
 
 
 @pytest.mark.parametrize("index", range(4))
@@ -87,7 +93,7 @@ def test_errors_of_noisy_depths_are_as_large_as_the_covariances_say() -> None:
     off, squared = [], []
     for index in range(3):
         noisy = disturbed_image(image, camera, np.random.default_rng(index))
-        found = find_apertures(noisy, camera, BoardModel())
+        found = find_apertures(noisy, camera, BARE)
         assert found.states == true_states(BARE, instance)
         error = found.p_WA - BARE.aperture_centres()
         off.append(np.linalg.norm(error, axis=1))
@@ -127,5 +133,3 @@ def test_an_image_without_a_board_is_refused() -> None:
     draw_boxes(image, np.array([[0.5, -0.19, 0.94]]), np.array([[0.02, 0.1, 2.0]]), [(110, 69, 36)])
     with pytest.raises(PerceptionError, match="no board of 4 x 5 apertures"):
         find(image)
-    with pytest.raises(ScenarioError, match="rows must be a positive number"):
-        BoardModel(rows=0)

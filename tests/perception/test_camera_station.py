@@ -11,13 +11,13 @@ import pytest
 from lic_drake.errors import PerceptionError
 from lic_drake.perception.apertures import find_apertures
 from lic_drake.perception.camera_station import NUM_CAMERAS, CameraStation
-from lic_drake.perception.cameras import take_views
 from lic_drake.perception.config import CameraConfig, CamerasConfig, ExternalConfig, HeadConfig
 from lic_drake.perception.goal import find_goal
 from lic_drake.perception.noise import disturbed_image
 from lic_drake.perception.observer import board_of, estimate_board
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.seeds import make_generator
+from scripts.perception.views import take_views
 
 CAMERA = CameraConfig(width=320, height=240, focal_px=262.5)
 CAMERAS = CamerasConfig(head=HeadConfig(camera=CAMERA), external=ExternalConfig(camera=CAMERA))
@@ -31,7 +31,7 @@ pytestmark = pytest.mark.usefixtures("_renderer")
 
 @pytest.fixture(scope="module")
 def station() -> CameraStation:
-    return CameraStation(INSTANCE, P_WG, CAMERAS, board_of(SCENARIO)[1], DRAW)
+    return CameraStation(INSTANCE, P_WG, CAMERAS, board_of(SCENARIO), DRAW)
 
 
 @pytest.mark.parametrize("number", [0, 1])
@@ -42,10 +42,10 @@ def test_a_look_is_what_cameras_errors_and_detectors_make_of_it(
     exact = take_views(INSTANCE, P_WG, CAMERAS)
     head = disturbed_image(exact.head, CAMERA, DRAW(NUM_CAMERAS * number))
     external = disturbed_image(exact.external, CAMERA, DRAW(NUM_CAMERAS * number + 1))
-    np.testing.assert_array_equal(look.views.head.depth, head.depth)
-    np.testing.assert_array_equal(look.views.external.color, external.color)
-    np.testing.assert_allclose(look.views.external.p_WC, external.p_WC, atol=1e-12)
-    apertures = find_apertures(head, CAMERA, board_of(SCENARIO)[1])
+    np.testing.assert_array_equal(look.head.depth, head.depth)
+    np.testing.assert_array_equal(look.external.color, external.color)
+    np.testing.assert_allclose(look.external.p_WC, external.p_WC, atol=1e-12)
+    apertures = find_apertures(head, CAMERA, board_of(SCENARIO))
     np.testing.assert_allclose(look.apertures.p_WA, apertures.p_WA, atol=1e-9)
     goal = find_goal(external, CAMERA, CAMERAS.ball_radius_m)
     np.testing.assert_allclose(look.goal.p_WG, goal.p_WG, atol=1e-9)
@@ -53,15 +53,13 @@ def test_a_look_is_what_cameras_errors_and_detectors_make_of_it(
 
 def test_what_a_detector_raises_comes_out_of_the_diagram() -> None:
     away = replace(CAMERAS.external, target=[2.1, 3.0, 1.0])
-    blind = CameraStation(
-        INSTANCE, P_WG, replace(CAMERAS, external=away), board_of(SCENARIO)[1], DRAW
-    )
+    blind = CameraStation(INSTANCE, P_WG, replace(CAMERAS, external=away), board_of(SCENARIO), DRAW)
     with pytest.raises(PerceptionError, match="no yellow ball in view"):
         blind.look(0)
 
 
 def test_a_lookout_dies() -> None:
-    station = CameraStation(INSTANCE, P_WG, CAMERAS, board_of(SCENARIO)[1], DRAW)
+    station = CameraStation(INSTANCE, P_WG, CAMERAS, board_of(SCENARIO), DRAW)
     alive = weakref.ref(station.diagram)
     del station
     gc.collect()
@@ -74,7 +72,7 @@ def test_the_robot_believes_what_it_saw(station: CameraStation) -> None:
     np.testing.assert_array_equal(belief.p_WG, look.goal.p_WG)
     starts = belief.starts
     # The board is where it was seen, not where it is.
-    board, _ = board_of(SCENARIO)
+    board = board_of(SCENARIO)
     shift = starts.board.aperture_centres().mean(axis=0) - look.apertures.p_WA.mean(axis=0)
     np.testing.assert_allclose(shift, 0.0, atol=1e-9)
     assert np.linalg.norm(starts.board.aperture_centres()[0] - board.aperture_centres()[0]) > 1e-4
