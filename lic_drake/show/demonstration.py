@@ -22,7 +22,6 @@ from lic_drake.reach.session import simulate_request
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.registry import Selector, make_selector, needs_library
-from lic_drake.select.situation import Selection, Situation
 from lic_drake.show.figures import ShownTrial, describe_start, is_reachable
 from lic_drake.show.pictures import remove_pictures, save_pictures
 from lic_drake.starts import FeasibleStarts, make_starts
@@ -117,6 +116,7 @@ def demonstrate(
         return belief.p_WG, belief.starts
 
     def reach(request: ReachRequest) -> ReachRecord:
+        say(f"attempt {len(traces) + 1}: starts at {describe_start(request.start)}")
         began = time.perf_counter()
         result = simulate_request(request, keep_states=True)
         record = make_record(request, result, time.perf_counter() - began)
@@ -128,8 +128,10 @@ def demonstrate(
         )
         return record
 
-    reporting = _ReportingSelector(selector, say)
-    done = run_trial(scenario, reporting, STREAM, seed, p_WG, attempts, reach=reach, look=look)
+    done = run_trial(scenario, selector, STREAM, seed, p_WG, attempts, reach=reach, look=look)
+    for number, selection in enumerate((attempt.selection for attempt in done), start=1):
+        if selection.probability is not None:
+            say(f"attempt {number}: estimated success {100 * selection.probability:.0f} %")
     # For a baseline, the pictures show what LIC would have estimated.
     shown = selector if isinstance(selector, LicSelector) else select_with("gp")
     assert isinstance(shown, LicSelector)
@@ -147,30 +149,6 @@ def demonstrate(
     )
     _write_json(result, method, seed)
     return result
-
-
-@dataclass(frozen=True)
-class _ReportingSelector:
-    """A strategy that reports its selections."""
-
-    selector: Selector
-    say: Callable[[str], None]
-
-    @property
-    def method(self) -> str:
-        """Name of the strategy."""
-        return self.selector.method
-
-    def select(self, situation: Situation) -> Selection:
-        """Selects a start."""
-        selection = self.selector.select(situation)
-        probability = selection.probability
-        estimate = "" if probability is None else f", estimated success {100 * probability:.0f} %"
-        self.say(
-            f"attempt {len(situation.failed) + 1}: {self.method} starts at"
-            f" {describe_start(selection.start)}{estimate} (selected in {selection.seconds:.2f} s)"
-        )
-        return selection
 
 
 def _metres(position: Vector) -> str:

@@ -9,14 +9,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.errors import LicError
 from lic_drake.evaluate.trial import Attempt
+from lic_drake.experience.files import readable_errors
 from lic_drake.reach.request import is_within_reach
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.start import IN_PLANE, Start
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.situation import FailedReach, Situation
-from lic_drake.show.page import writing
 from lic_drake.starts import FeasibleStarts, make_starts
 from lic_drake.types import Vector
 
@@ -35,8 +36,11 @@ def save_figure(figure: Figure, path: Path, margins: bool = True) -> None:
     Raises:
         LicError: The file cannot be written.
     """
-    with writing(path):
-        figure.savefig(path, dpi=150, bbox_inches="tight" if margins else None)
+    try:
+        with readable_errors(path, "write"):
+            figure.savefig(path, dpi=150, bbox_inches="tight" if margins else None)
+    except ValueError as error:  # The ending is unknown.
+        raise LicError(f"cannot write {path}: {error}") from None
 
 
 @dataclass(frozen=True, kw_only=True)

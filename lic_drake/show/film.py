@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from PIL import Image
 from pydrake.systems.framework import DiagramBuilder
 
+from lic_drake.experience.files import readable_errors
 from lic_drake.perception.cameras import add_cameras, take_color_image
 from lic_drake.perception.config import CamerasConfig
 from lic_drake.show.figures import ShownTrial
-from lic_drake.show.page import writing
 from lic_drake.show.stage import place
 
 FRAMES_PER_SECOND = 2.0
@@ -57,5 +57,5 @@ def save_film(frames: Iterable[NDArray[np.uint8]], path: Path) -> None:
     first, *others = [Image.fromarray(frame) for frame in frames]
     duration = round(1000.0 / (SPEED * FRAMES_PER_SECOND))
     options = {"save_all": True, "append_images": others, "duration": duration, "loop": 0}
-    with writing(path):
+    with readable_errors(path, "write"):
         first.save(path, format="WEBP", quality=70, **options)

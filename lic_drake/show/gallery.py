@@ -24,6 +24,9 @@ from lic_drake.types import Vector
 MAX_ENVIRONMENTS = 300
 """Number of environments that are tried for a success, and a failure."""
 
+ATTEMPTS = 2
+"""Largest number of attempts at a goal."""
+
 STREAM = "evaluation"
 """Seed stream of the environments; none of them is in a library."""
 
@@ -80,7 +83,6 @@ def choose_exhibits(
     method: str = "gp",
     each: int = 1,
     first_environment: int = 0,
-    attempts: int = 2,
     say: Callable[[str], None] = print,
 ) -> list[Exhibit]:
     """Returns the first trials that reach their goal and the first that do not.
@@ -93,7 +95,6 @@ def choose_exhibits(
         method: Strategy, see `lic_drake.select.registry.method_names`.
         each: Number of successes, and of failures.
         first_environment: Index of the environment to begin with.
-        attempts: Largest number of attempts at a goal.
         say: Gets a line for every exhibit.
 
     Raises:
@@ -112,7 +113,7 @@ def choose_exhibits(
     goals = ((i, scenario.sample_goal(STREAM, i)) for i in itertools.count(first_environment))
     reachable = (pair for pair in goals if is_reachable(scenario, STREAM, *pair))
     for environment, p_WG in itertools.islice(reachable, MAX_ENVIRONMENTS):
-        done = run_trial(scenario, selector, STREAM, environment, p_WG, attempts)
+        done = run_trial(scenario, selector, STREAM, environment, p_WG, ATTEMPTS)
         success = done[-1].record.success
         if wanted[success] == 0:
             continue

@@ -4,11 +4,6 @@ import base64
 import gzip
 import hashlib
 import html
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
-
-from lic_drake.errors import LicError
 
 UNPACK = (
     "async (text) => new Response(new Blob([Uint8Array.from(atob(text), c => c.charCodeAt(0))])"
@@ -96,17 +91,3 @@ def embed(page: str, title: str = "recording", height_px: int = 480, button: str
         "button.addEventListener('click', show);\n"
         "if (location.hash.slice(1) === button.closest('section')?.id) show();}</script>"
     )
-
-
-@contextmanager
-def writing(path: Path) -> Iterator[None]:
-    """Turns what goes wrong while a file is written into one clear error.
-
-    Raises:
-        LicError: The file cannot be written.
-    """
-    try:
-        yield
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise LicError(f"cannot write {path}: {reason}") from None

@@ -20,10 +20,11 @@ from pydrake.multibody.meshcat import ContactVisualizer, ContactVisualizerParams
 from pydrake.systems.framework import DiagramBuilder
 
 from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.experience.files import readable_errors
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.show.approach import Approach
-from lic_drake.show.page import embed, writing
+from lic_drake.show.page import embed
 from lic_drake.show.stage import add_stage, place
 from lic_drake.types import Vector
 
@@ -141,7 +142,7 @@ class Recording:
         Raises:
             LicError: The file cannot be written.
         """
-        with writing(path):
+        with readable_errors(path, "write"):
             path.write_text(self.html(), encoding="utf-8")
 
     def _repr_html_(self) -> str:

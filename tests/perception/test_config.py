@@ -9,9 +9,7 @@ from lic_drake.perception.config import (
     CameraConfig,
     CamerasConfig,
     ExternalConfig,
-    HeadConfig,
     NoiseConfig,
-    PoseErrorConfig,
     load_cameras,
 )
 
@@ -45,9 +43,7 @@ def test_unknown_files_and_keys_are_named(tmp_path: Path) -> None:
     ("config", "values", "message"),
     [
         (NoiseConfig(), {"dropout": 1.5}, "dropout must be from 0 to 1, got 1.5"),
-        (PoseErrorConfig(), {"rotation_deg": float("nan")}, "rotation_deg must be 0 or a positive"),
         (CameraConfig(), {"nearest_m": 6.0}, "furthest_m must be from 6"),
-        (HeadConfig(), {"base_pose": [0.0, 1.0]}, "base_pose must be 3 finite numbers"),
         (ExternalConfig(), {"p_WC": [0.84, -0.29, 3.0]}, "cannot look straight up or down"),
     ],
 )

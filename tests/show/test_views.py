@@ -9,7 +9,7 @@ from matplotlib.image import imread
 from matplotlib.patches import Circle, Polygon, Rectangle
 from support.kinematics import link_origins
 from support.reaches import free_space
-from support.worlds import ARM, box, corners, cylinder, make_clutter
+from support.worlds import ARM, box, cylinder, make_clutter
 
 from lic_drake.clutter.registry import category_names
 from lic_drake.errors import LicError
@@ -63,18 +63,6 @@ def test_every_object_is_drawn_where_it_stands(ax: Axes) -> None:
     # A quarter turn about the box's centre exchanges its edges.
     drawn = rectangle.get_patch_transform().transform([[0, 0], [1, 0], [1, 1], [0, 1]])
     np.testing.assert_allclose([drawn.min(axis=0), drawn.max(axis=0)], [[0.65, 0], [0.75, 0.2]])
-
-
-def test_the_walls_of_a_passage_are_drawn_at_their_slope(ax: Axes) -> None:
-    scenario = load_scenario("passage-clutter")
-    instance = scenario.sample_instance("training", 0)
-    assert instance.p_WG is not None and instance.yaw[0] > 0.1
-    draw_view(ax, scenario, instance, instance.p_WG)
-    walls = [patch for patch in ax.patches if isinstance(patch, Rectangle)]
-    assert len(walls) == 2
-    for i, wall in enumerate(walls):
-        drawn = wall.get_patch_transform().transform([[0, 0], [1, 0], [1, 1], [0, 1]])
-        np.testing.assert_allclose(drawn, corners(instance, i), atol=1e-9)
 
 
 @pytest.mark.parametrize("category", category_names())
