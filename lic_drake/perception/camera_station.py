@@ -1,4 +1,4 @@
-"""The diagram in which the robot looks: environment, cameras, their errors, and detectors."""
+"""The observation diagram: environment, cameras, their errors, and detectors."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -92,7 +92,6 @@ class CameraStation:
         self.diagram = builder.Build()
         self.diagram.set_name("camera_station")
         self._context = self.diagram.CreateDefaultContext()
-        rig.set_looking_posture(self._context)
 
     def look(self, number: int) -> Look:
         """Returns what is seen and detected.
@@ -139,9 +138,8 @@ class DisturbedCamera(LeafSystem):
         ):
             self.DeclareAbstractInputPort(name, Value(value))
         self.DeclareVectorInputPort("look", 1)
-        self.DeclareAbstractOutputPort(
-            "image", _make_placeholder, weakly(cast(_Calc, self._calc_image))
-        )
+        calc = weakly(cast(_Calc, self._calc_image))
+        self.DeclareAbstractOutputPort("image", _make_placeholder, calc)
 
     def _calc_image(self, context: Context, output: AbstractValue) -> None:
         look = int(np.asarray(self.GetInputPort("look").Eval(context))[0])
@@ -163,9 +161,8 @@ class Detector(LeafSystem):
         super().__init__()
         self._find = find
         self.DeclareAbstractInputPort("image", _make_placeholder())
-        self.DeclareAbstractOutputPort(
-            "found", _make_placeholder, weakly(cast(_Calc, self._calc_found))
-        )
+        calc = weakly(cast(_Calc, self._calc_found))
+        self.DeclareAbstractOutputPort("found", _make_placeholder, calc)
 
     def _calc_found(self, context: Context, output: AbstractValue) -> None:
         image = cast(CameraImage, self.GetInputPort("image").Eval(context))
@@ -194,10 +191,7 @@ def _connect(
     builder.ExportOutput(detector.GetOutputPort("found"), target_name)
 
 
-class _Placeholder:
-    """Initial value of a port that carries a Python object."""
-
-
 def _make_placeholder() -> AbstractValue:
-    placeholder: AbstractValue = AbstractValue.Make(_Placeholder())
+    """Returns the initial value of a port that carries a Python object."""
+    placeholder: AbstractValue = AbstractValue.Make(object())
     return placeholder

@@ -78,26 +78,17 @@ def make_renderer(lights: Sequence[LightParameter] = _ROOM) -> RenderEngine:
 
 
 class CameraRig(NamedTuple):
-    """A scene with a PR2 that looks, and its cameras, in a diagram.
+    """A scene with an observing PR2, and its cameras, in a diagram.
 
     Attributes:
         scene: Mobile robot and environment.
-        b0: Where the robot looks from, shape (3,), metres.
         head: The sensor on the robot's head.
         external: The sensor that sees the goal.
     """
 
     scene: Scene
-    b0: Vector
     head: RgbdSensor
     external: RgbdSensor
-
-    def set_looking_posture(self, root: Context) -> None:
-        """Puts the robot where it looks from, its right arm beside its body, in a root context."""
-        plant = self.scene.plant
-        context = plant.GetMyMutableContextFromRoot(root)
-        positions = self.scene.robot.positions(self.b0, RIGHT_ARM_AT_REST)
-        plant.SetPositions(context, self.scene.arm, positions)
 
 
 def add_cameras(
@@ -107,7 +98,9 @@ def add_cameras(
     cameras: CamerasConfig,
     ahead: bool = False,
 ) -> CameraRig:
-    """Adds an environment, a ball at the goal, the robot where it looks from, and the cameras.
+    """Adds an environment, a ball at the goal, a PR2 that observes it, and the cameras.
+
+    In the default context the robot stands where it looks from, its right arm at its side.
 
     Args:
         builder: Gets plant, scene graph and the sensors `head` and `external`.
@@ -130,10 +123,11 @@ def add_cameras(
     add_prop(scene_graph, "floor", Box(20.0, 20.0, 0.02), np.array([0, 0, -0.01]), FLOOR_COLOR)
     mount = plant.GetFrameByName(HEAD_CAMERA)
     parent = plant.GetBodyFrameIdOrThrow(mount.body().index())
+    b0 = np.array([x, y, head.torso_m])
+    plant.SetDefaultPositions(scene.arm, robot.positions(b0, RIGHT_ARM_AT_REST))
     X_WC = look_at(external.p_WC, external.target)
     return CameraRig(
         scene=scene,
-        b0=np.array([x, y, head.torso_m]),
         head=add_camera(
             builder, scene_graph, "head", head.camera, mount.GetFixedPoseInBodyFrame(), parent
         ),

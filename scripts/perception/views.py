@@ -42,7 +42,6 @@ def take_views(instance: ClutterInstance, p_WG: Vector, cameras: CamerasConfig) 
     rig = add_cameras(builder, instance, p_WG, cameras)
     diagram = builder.Build()
     root = diagram.CreateDefaultContext()
-    rig.set_looking_posture(root)
     return Views(
         head=_take(rig.head, root, cameras.head.camera),
         external=_take(rig.external, root, cameras.external.camera),
