@@ -71,7 +71,7 @@ class DetectedApertures:
 def find_apertures(
     image: CameraImage, camera: CameraConfig, board: ApertureBoard
 ) -> DetectedApertures:
-    """Finds the board and looks into its apertures.
+    """Locates the board and measures how far each of its apertures is covered.
 
     Bars are assumed to be as thick as they are wide, because only their fronts are visible.
 
@@ -81,7 +81,7 @@ def find_apertures(
         board: Gives rows, columns and spacing, which is all that is known beforehand.
 
     Raises:
-        PerceptionError: There is no such board in view.
+        PerceptionError: No such board is in view.
     """
     view = _BoardView(image, find_board_plane(image, camera))
     # Covers do not lie quite in the plane of the bars' fronts, so the plane is fitted to the bars.

@@ -97,7 +97,7 @@ def fit_grid(
         resolution_m: Distance of the points at which to look, metres.
 
     Raises:
-        PerceptionError: There is no such grid.
+        PerceptionError: No such grid was found.
     """
     size = _counts(board) * board.aperture_m
     # Leaves room for a board that is partly out of view, and for its surroundings.

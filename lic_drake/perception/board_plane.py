@@ -68,7 +68,7 @@ def find_board_plane(image: CameraImage, camera: CameraConfig) -> BoardPlane:
         camera: Gives the errors of depths.
 
     Raises:
-        PerceptionError: There is no board.
+        PerceptionError: No board is in view.
     """
     # Takes half a second to import, and reaches do not need it.
     from sklearn.linear_model import LinearRegression, RANSACRegressor

@@ -193,7 +193,7 @@ def add_camera(
 
 
 def add_prop(scene_graph: SceneGraph, name: str, shape: Shape, p_WO: Vector, color: Vector) -> None:
-    """Adds a fixed thing that only cameras see; `color` is RGBA, shape (4,)."""
+    """Adds a fixed object that only cameras see; `color` is RGBA, shape (4,)."""
     source = scene_graph.RegisterSource(name)
     geometry = scene_graph.RegisterAnchoredGeometry(
         source, GeometryInstance(RigidTransform(p_WO), shape, name)

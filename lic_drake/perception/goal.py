@@ -21,7 +21,7 @@ YELLOW_VALUE = 0.25
 """Least brightness of the ball, 0 to 1."""
 
 MIN_PIXELS = 20
-"""Smaller yellow spots are not the ball."""
+"""Minimum number of pixels of the ball."""
 
 RIM = 0.2
 """Rays that enter the ball by less than this share of radius^2 are left out of the covariance."""
@@ -53,7 +53,7 @@ def find_goal(image: CameraImage, camera: CameraConfig, ball_radius_m: float) ->
         ball_radius_m: Radius of the ball, metres.
 
     Raises:
-        PerceptionError: There is no ball in view.
+        PerceptionError: No ball is in view.
     """
     hue, saturation, value = np.moveaxis(rgb2hsv(image.color), -1, 0)
     yellow = (hue > YELLOW_HUE[0]) & (hue < YELLOW_HUE[1])

@@ -17,7 +17,7 @@ from lic_drake.starts import BoardStarts, FeasibleStarts, board_starts
 from lic_drake.types import Vector
 
 LEAST_PROBABILITY = 0.5
-"""Apertures that are less likely open are treated as blocked."""
+"""Apertures whose probability of being open is lower are treated as blocked."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +45,7 @@ class Belief:
 
 @dataclass(kw_only=True)
 class Observer:
-    """Looks at one environment before every attempt and remembers what was seen.
+    """Observes one environment before every attempt and caches its beliefs.
 
     Attributes:
         scenario: The scenario.

@@ -1,4 +1,4 @@
-"""How a PR2's arm gets to the start of a reach, and back, without touching the board."""
+"""Collision-free paths of a PR2's arm between its waiting posture and the start of a reach."""
 
 import numpy as np
 
@@ -12,23 +12,23 @@ WAITING_DEG = np.array([-70.0, 40.0, -90.0, -125.0, 0.0, -60.0, 0.0])
 """Our posture for observing and driving: elbow out to the side, hand close to the body."""
 
 RETREAT_M = 0.3
-"""Length of the tool's straight way into an aperture, where the joint limits allow it, metres."""
+"""Length of the tool's straight path into an aperture, where joint limits allow it, metres."""
 
 RETREAT_STEP_M = 0.01
-"""Steps of that way, metres."""
+"""Step length along that path, metres."""
 
 MAX_NEWTON_STEPS = 10
-"""Iterations of the inverse kinematics along that way."""
+"""Newton iterations of the inverse kinematics at each step."""
 
 CHECKED_RAD = 0.03
-"""Distance of checked configurations along a path, radians."""
+"""Largest joint step between collision checks, radians."""
 
 VIA_POINTS = 1000
-"""Number of random via points that are tried where the direct way is not free."""
+"""Number of random via points that are tried where the direct path is not free."""
 
 
 class Approach:
-    """Plans the arm's way between its waiting posture and a start.
+    """Plans the arm's path between its waiting posture and a start.
 
     Attributes:
         waiting: The waiting posture, shape (7,), radians.

@@ -69,7 +69,7 @@ def demonstrate(
         out: Folder for demo.html, demo.json and the files of
             `lic_drake.show.pictures.save_pictures`; those of an earlier demonstration are removed.
         attempts: Largest number of reaches.
-        say: Gets a line for every step.
+        say: Receives progress messages.
         drake_models: Folder of package://drake_models, to show a PR2 in its meshes.
         cameras: Cameras with which a PR2 detects apertures and goal before every attempt; by
             default both are known.

@@ -1,4 +1,4 @@
-"""What all figures share: files, colours, labels."""
+"""Shared by all figures: files, colours, labels."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ def save_figure(figure: Figure, path: Path, margins: bool = True) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class ShownTrial:
-    """A trial with everything that pictures show of it.
+    """A trial and what is needed to draw it.
 
     Attributes:
         scenario: Robot and task.
@@ -91,7 +91,7 @@ def situation_before(attempts: Sequence[Attempt], number: int, starts: FeasibleS
 
 
 def estimate_title(selector: LicSelector, number: int, attempt: Attempt) -> str:
-    """Returns which estimate is shown for an attempt, from 1, and how that ended."""
+    """Returns the title of an attempt's panel: its number, from 1, the model and the outcome."""
     model = 1 if selector.second is None else min(number, 2)
     outcome = attempt.record.outcome
     return f"attempt {number}, LIC-{model} ({selector.method}): {outcome}"

@@ -95,7 +95,7 @@ def choose_exhibits(
         method: Strategy, see `lic_drake.select.registry.method_names`.
         each: Number of successes, and of failures.
         first_environment: Index of the environment to begin with.
-        say: Gets a line for every exhibit.
+        say: Receives a message for every exhibit.
 
     Raises:
         LicError: The method or the library cannot be used.

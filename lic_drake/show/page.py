@@ -1,4 +1,4 @@
-"""Self-contained HTML pages: pictures and recordings are embedded."""
+"""Self-contained HTML pages with embedded pictures and recordings."""
 
 import base64
 import gzip

@@ -1,4 +1,4 @@
-"""What a demonstration shows of its attempts: a recording, figures, stills, a film and a page."""
+"""A demonstration's output: recording, figures, stills, film and page."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -28,7 +28,7 @@ _OLD = (
 
 
 def remove_pictures(out: Path) -> None:
-    """Removes an earlier demonstration's pictures, some of which a new one may not have."""
+    """Removes pictures of an earlier demonstration, not all of which the new one overwrites."""
     for old in (path for pattern in _OLD for path in out.glob(pattern)):
         old.unlink()
 
@@ -51,7 +51,7 @@ def save_pictures(
         selector: Whose estimates to draw.
         known: What the robot observed, or the feasible starts if it knows them.
         out: The folder.
-        say: Gets a line if stills cannot be rendered.
+        say: Receives a warning if stills cannot be rendered.
         drake_models: Folder of package://drake_models, to show a PR2 in its meshes.
 
     Returns:

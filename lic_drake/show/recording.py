@@ -29,7 +29,7 @@ from lic_drake.show.stage import add_stage, place
 from lic_drake.types import Vector
 
 PAUSE_S = 1.0
-"""Least time between two reaches, seconds."""
+"""Minimum pause between two reaches, seconds."""
 
 TICKS_PER_FRAME = 10
 """Meshcat rounds times down to ticks; with one tick a frame, some frames would coincide."""
@@ -113,7 +113,7 @@ class Recording:
             self._clock_s = begin + math.ceil(trace.time_s[-1] + PAUSE_S)
 
     def move_to(self, b0: Vector, q: Vector) -> None:
-        """Records base, torso and arm moving to a start, in that order.
+        """Records the moves of base, torso and arm to a start, in that order.
 
         Args:
             b0: Base position and torso height, shape (3,), metres.
@@ -124,9 +124,9 @@ class Recording:
         self._follow(b0, q[None] if self._approach is None else self._approach.path(b0, q))
 
     def retract(self, trace: ReachTrace) -> None:
-        """Records the arm going back the way it came, and to its waiting posture.
+        """Records the arm retracing its path and returning to its waiting posture.
 
-        Stems spring back with it, as they do once nothing holds them.
+        Stems spring back with it, as they do once released.
         """
         self._show_forces(False)
         step = round(RETRACT_SPEED * self._sample_step())
@@ -160,9 +160,9 @@ class Recording:
         return round(self._scenario.mpc.rate_hz / self._frames_per_second)
 
     def _follow(self, b0: Vector, path: Vector) -> None:
-        """Records a move of base and torso to b0 and of the arm along a path; none if it is there.
+        """Records base and torso moving to b0 and the arm along a path, unless already there.
 
-        Each takes at least `MOVE_S` and is slow at its ends.
+        Each move takes at least `MOVE_S` and eases in and out.
         """
         old_b0 = self._b0
         path = np.vstack([self._q, path])
@@ -177,7 +177,7 @@ class Recording:
             self._clock_s += 1.0 / self._frames_per_second
 
     def _draw(self, trace: ReachTrace | None = None, k: int = 0, with_clutter: bool = True) -> None:
-        """Draws the robot as it is, or a sample of a reach, at the present time."""
+        """Draws the robot's current configuration, or a sample of a reach, at the current time."""
         state = None if trace is None else trace.states[k]
         if state is not None:
             self._q = state.q
@@ -187,7 +187,7 @@ class Recording:
         self._diagram.ForcedPublish(self._context)
 
     def _show_forces(self, visible: bool) -> None:
-        """Shows or hides contact forces from now on: between reaches nothing is simulated."""
+        """Shows or hides contact forces from now on; moves between reaches are not simulated."""
         self._meshcat.SetProperty(_FORCES, "visible", visible, self._clock_s)
 
     def _set_up_view(self) -> None:

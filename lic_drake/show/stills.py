@@ -1,4 +1,4 @@
-"""Rendered stills of attempts: their start, the moment of the hardest push, and their end."""
+"""Rendered stills of attempts: start, moment of the largest contact force, and end."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -39,13 +39,13 @@ FLOOR_COLOR = np.array([0.74, 0.74, 0.76, 1.0])
 """Colour of the floor, RGBA."""
 
 NEWTONS_PER_METRE = 20.0
-"""Scale of the arrows that stand for forces."""
+"""Scale of the force arrows."""
 
 LONGEST_ARROW_M = 0.3
-"""Length of the arrows of larger forces, whose size the caption gives."""
+"""Maximum length of a force arrow; the caption gives the largest force."""
 
 LEAST_FORCE_N = 0.05
-"""Smaller forces are not drawn."""
+"""Minimum force that is drawn."""
 
 # Cylinders of the plane stand with their middle at z = 0.
 _FLOOR_IN_PLANE_M = -0.13
@@ -164,7 +164,7 @@ def save_stills(
     Args:
         trial: What to show.
         out: The folder.
-        say: Gets a line if stills cannot be rendered; there are none then.
+        say: Receives a warning if stills cannot be rendered; none are written then.
         drake_models: Folder of package://drake_models, to show a PR2 in its meshes.
 
     Returns:
