@@ -14,22 +14,21 @@ from lic_drake.starts import Region, find_regions
 from lic_drake.types import Vector
 
 RISE_PER_M = 5.0
-"""Beside a place an estimate may be higher than there by this times the distance: an L1 kernel has
-kinks, where a solver stops. From the best place of each aperture alone its end was below the best
-of 20,000 samples in every fifth situation, by up to 17 points."""
+"""How fast an estimate may rise with the distance from a candidate: neighbours are evaluated where
+it could exceed the best. An L1 kernel has kinks, at which a solver stops: solved from the best
+place of each aperture alone, it ended below the best of 20,000 samples in every fifth situation."""
 
 MAX_REFINED = 150
-"""Only around so many candidates, the best ones, others are looked at."""
+"""Number of best candidates whose neighbours are evaluated."""
 
 MAX_TRIED = 40
-"""So many candidates of a region are tried, the best first, until the arm can be there."""
-
+"""Number of candidates of a region that are tried, best first, until one is feasible."""
 
 LEAST_GAIN = 1e-9
-"""A start takes the place of another one if it is better by more than rounding."""
+"""Smallest improvement that counts; less is rounding."""
 
 VIOLATED = 1e6
-"""Candidates that violate a constraint count as this much worse."""
+"""Penalty of candidates that violate a constraint."""
 
 
 class _Best:
@@ -55,10 +54,10 @@ class LicSelector:
     A first attempt is chosen with LIC-1, a further one with LIC-2, which knows how the attempts
     before it failed. Without LIC-2, further attempts are LIC-1's best away from the failed ones.
 
-    First candidates are compared: the discrete starts, a lattice between them and, where the family
-    of starts asks for it, the neighbours of the best ones. From the best ones a `LicProgram` is
-    solved, and the best of all that is feasible is the answer, whatever the solver reports. Most is
-    found by the lattice; scripts/selection/README.md says how much the program adds.
+    Candidates are compared first: the discrete starts, a lattice between them and, before a board,
+    neighbours of the best ones. A `LicProgram` is then solved from the best, and the answer is the
+    best feasible start of all, whatever the solver reports. Most is found by the lattice: in the
+    plane the program adds 0.2 to 2.7 points, before a board nothing (scripts/selection/README.md).
     """
 
     def __init__(
@@ -150,7 +149,7 @@ class LicSelector:
         candidates, values = self.search(program)
         order = np.argsort(-values, kind="stable")
         best = _Best(program)
-        if values[order[0]] > -np.inf:
+        if len(order) and values[order[0]] > -np.inf:
             best.consider(candidates[int(order[order < num_discrete][0])])
         region_of = find_regions(regions, candidates)
         tried: Counter[int] = Counter()

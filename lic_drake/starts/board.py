@@ -35,16 +35,16 @@ _DECIMALS = 6
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BoardStarts(FeasibleStarts):
-    """Starts at the open apertures of a board, from the bases and torso heights of a stand.
+    """Starts at the open apertures of a board, from wherever base and torso may be.
 
-    A redundant arm has one preferred configuration for each: of those in which it touches neither
-    board nor body the one of least cost, Eq. (5).
+    A redundant arm has one preferred configuration for each: the cheapest by Eq. (5) of those in
+    which it touches neither the board nor the robot's body.
 
     Attributes:
         scenario: The scenario, with an arm in space and a board of apertures.
         instance: The environment.
-        b0_lower: From where base and torso may be, shape (3,), metres.
-        b0_upper: To where, shape (3,), metres.
+        b0_lower: Lower bounds of base and torso, shape (3,), metres; x is fixed.
+        b0_upper: Their upper bounds, shape (3,), metres.
         probability_open: How likely each open aperture really is open, shape (k,); None where that
             is certain.
     """
@@ -104,7 +104,7 @@ class BoardStarts(FeasibleStarts):
     def grid(self) -> Starts:
         """All open apertures, from bases and heights of the torso in equal steps."""
         y, torso = (self._steps(axis, GRID_M[axis - 1]).tolist() for axis in (1, 2))
-        b0 = tuple((0.0, *place) for place in product(y, torso))
+        b0 = tuple((float(self.b0_lower[0]), *place) for place in product(y, torso))
         found = _preferred_before_bare_board(self.arm, _numbers(self.board), b0)
         if len(self.p_WA) == len(self.board.aperture_centres()):
             return found
@@ -117,10 +117,10 @@ class BoardStarts(FeasibleStarts):
         return found.take(np.array(free))
 
     def lattice(self, values: Vector) -> Starts:
-        """Returns bases and torsos all over the stand, each aperture with the hand of its best.
+        """Returns bases and torso heights within the bounds, with the best hand of each aperture.
 
-        Among them are all from which the robot has this aperture where it had one when it learned:
-        an L1 kernel has kinks there, and the process its peaks.
+        They include those that see an aperture where the library has one: an L1 kernel has its
+        kinks there, and a Gaussian process its peaks.
         """
         found = self.grid.take(np.zeros(0, dtype=int))
         stand = self.scenario.task.stand
@@ -135,7 +135,7 @@ class BoardStarts(FeasibleStarts):
                 self._steps(axis, LATTICE_M, np.add.outer(apart[axis - 1], learned[axis - 1]))
                 for axis in (1, 2)
             )
-            b0 = np.array([[0.0, *place] for place in product(y, torso)])
+            b0 = np.array([[self.b0_lower[0], *place] for place in product(y, torso)])
             found = found.join(Starts(np.tile(x0, (len(b0), 1)), b0))
         return found
 

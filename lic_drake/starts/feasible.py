@@ -13,14 +13,14 @@ from lic_drake.types import Vector
 
 
 class Effort(NamedTuple):
-    """How a selection searches among the starts of a family.
+    """How thoroughly a selection searches among feasible starts.
 
     Attributes:
-        steps_m: Distances at which the neighbours of good candidates are looked at, one after the
-            other, metres; none where candidates are dense enough.
-        solves: From so many candidates an optimisation begins.
-        solves_per_region: From so many of one region.
-        max_gain: Regions whose best candidate is this much below the best one are left out.
+        steps_m: Distances, in turn, at which neighbours of good candidates are evaluated, metres;
+            empty where the lattice is dense enough.
+        solves: Number of candidates from which the program is solved.
+        solves_per_region: The same in each region.
+        max_gain: A region is skipped if its best candidate is this much below the best so far.
     """
 
     steps_m: tuple[float, ...] = ()
@@ -30,7 +30,7 @@ class Effort(NamedTuple):
 
 
 class FeasibleStarts(ABC):
-    """The initial conditions (x0, b0) that an arm can reach from in an environment (Eqs. 3, 4).
+    """The initial conditions (x0, b0) that are feasible for an arm in an environment (Eqs. 3, 4).
 
     Attributes:
         effort: How a selection searches among them.
@@ -78,12 +78,12 @@ class FeasibleStarts(ABC):
 
     @property
     def checker(self) -> CollisionChecker | None:
-        """The mobile robot before what it must keep away from; None if no start comes near it."""
+        """The mobile robot and what it must keep away from; None if no start comes near it."""
         return None
 
     @property
     def home(self) -> Vector | None:
-        """Base and torso from which the robot had rather not move, shape (3,), metres, if any."""
+        """Base and torso from which the robot prefers not to move, shape (3,), metres, if any."""
         return None
 
     def neighbours(self, some: Starts, step_m: float) -> Starts:
@@ -91,7 +91,7 @@ class FeasibleStarts(ABC):
         return some.take(np.zeros(0, dtype=int))
 
     def chance(self, x0: Vector) -> Vector:
-        """Returns how likely n hand poses are as feasible as they seem, shape (n,)."""
+        """Returns the probability that n hand poses are feasible, shape (n,); 1 by default."""
         return np.ones(len(x0))
 
     def nearest(self, x0: Vector, b0: Vector) -> Start | None:
