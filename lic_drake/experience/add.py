@@ -84,12 +84,10 @@ def add_rows(
     """
     origin = origin or source
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,100}", source) or source == SIMULATION:
-        raise LibraryError(
-            f"{quoted(source)} cannot be the name of a source; use something like lab-arm"
-        )
+        raise LibraryError(f"{quoted(source)} cannot be the name of a source; use one like lab-arm")
     if not 1.0 / MAX_WEIGHT <= weight <= MAX_WEIGHT:
         raise LibraryError(
-            f"a weight must be from {1.0 / MAX_WEIGHT:g} to {MAX_WEIGHT:g} simulated reaches, got"
+            f"a weight is from {1.0 / MAX_WEIGHT:g} to {MAX_WEIGHT:g} simulated reaches, got"
             f" {weight:g}"
         )
     if library.path.is_file():
@@ -97,17 +95,19 @@ def add_rows(
     scenario = library.scenario()
     values = check_rows(rows, scenario, origin)
     digest = _digest(repr(values))
-    constant: dict[str, Any] = {
-        "category": scenario.category,
-        "robot": scenario.robot,
-        "scenario": scenario.digest,
-        "stream": f"{source}-{digest}",  # Shares no environments with any other rows.
-        "lic_drake_version": lic_drake.__version__,
-        "source": source,
-        "weight": float(weight),
-    }
     records = [
-        ReachRecord(**constant, **row, key=_digest(f"{digest} {i}")) for i, row in enumerate(values)
+        ReachRecord(
+            **row,
+            key=_digest(f"{digest} {i}"),
+            category=scenario.category,
+            robot=scenario.robot,
+            scenario=scenario.digest,
+            stream=f"{source}-{digest}",  # Shares no environments with any other rows.
+            lic_drake_version=lic_drake.__version__,
+            source=source,
+            weight=float(weight),
+        )
+        for i, row in enumerate(values)
     ]
     with library.locked():
         if records[0].key in library.successes():
@@ -208,29 +208,28 @@ def _number(value: object, name: str, default: float | None, where: str) -> floa
 def _check_ranges(row: Mapping[str, float], scenario: Scenario, where: str) -> None:
     """Rejects a row that is impossible for the scenario's robot and task."""
     b0 = np.array([row["base_x"], row["base_y"], row.get("torso", 0.0)])
-    p_WG = np.array([row["goal_x"], row["goal_y"], row.get("goal_z", 0.0)])
     try:
-        check_goal(scenario, p_WG - b0)
+        check_goal(scenario, [row["goal_x"], row["goal_y"], row.get("goal_z", 0.0)] - b0)
     except RequestError as error:
         raise LibraryError(f"{where}: {error}, or leave the row out") from None
     if "torso" in row:
         length = math.hypot(*(row[f"start_q{axis}"] for axis in "wxyz"))
         limits = [("the length of the quaternion start_qw to start_qz", length, 0.999, 1.001, "")]
     else:
-        line, hint = scenario.task.start_line, f" from the base on {scenario.category}'s start line"
-        low, high = line.y_min_m - START_TOLERANCE_M, line.y_max_m + START_TOLERANCE_M
-        x, y = row["start_x"] - b0[0], row["start_y"] - b0[1]
+        line, unit = (
+            scenario.task.start_line,
+            f" m from the base ({scenario.category}'s start line)",
+        )
         limits = [
-            *(
-                (n, row[n], -3.1416, 3.1416, " rad, not degrees")
-                for n in ("start_phi", "final_phi")
-            ),
-            ("start_x", x, line.x_m - START_TOLERANCE_M, line.x_m + START_TOLERANCE_M, f" m{hint}"),
-            ("start_y", y, low, high, f" m{hint}"),
+            ("start_phi", row["start_phi"], -3.1416, 3.1416, " rad, not degrees"),
+            ("final_phi", row["final_phi"], -3.1416, 3.1416, " rad, not degrees"),
+            ("start_x", row["start_x"] - b0[0], line.x_m, line.x_m, unit),
+            ("start_y", row["start_y"] - b0[1], line.y_min_m, line.y_max_m, unit),
         ]
-    for name, value, lowest, highest, unit in limits:
-        if value < lowest or value > highest:  # NaN is an unobserved value.
+    for name, value, low, high, unit in limits:
+        tolerance = START_TOLERANCE_M if unit.startswith(" m") else 0.0
+        if value < low - tolerance or value > high + tolerance:  # NaN is an unobserved value.
             raise LibraryError(
-                f"{where}: {name} is {value:g}, but must be from {lowest:g} to {highest:g}{unit};"
-                " correct it or leave the row out"
+                f"{where}: {name} is {value:g}, but must be from {low - tolerance:g} to"
+                f" {high + tolerance:g}{unit}; correct it or leave the row out"
             )

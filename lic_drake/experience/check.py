@@ -21,7 +21,7 @@ NOT_COMPARED = ("wall_time_s", "lic_drake_version", "drake_version", "weight")
 
 @dataclass(frozen=True, kw_only=True)
 class LibraryReport:
-    """Result of `check_library`.
+    """Result of `check_library`; the last three fields concern its request.
 
     Attributes:
         shards: Number of Parquet files.
@@ -29,9 +29,9 @@ class LibraryReport:
         damaged: Names of unreadable Parquet files, with the reason in one line.
         scenarios: Digests of the scenarios in the library; more than one is an error.
         duplicates: Keys of reaches that occur more than once, sorted.
-        requested: Number of requested reaches; None without a request.
-        missing: Number of requested reaches that no shard holds; None without a request.
-        incomplete: Indices of the requested environments that lack reaches.
+        requested: Number of requested reaches; None without a request, as `missing`.
+        missing: Number of requested reaches that no shard holds.
+        incomplete: Indices of the environments that lack reaches.
     """
 
     shards: int
@@ -94,13 +94,7 @@ def check_library(
 
 @dataclass(frozen=True, kw_only=True)
 class Difference:
-    """A row that was not reproduced.
-
-    Attributes:
-        key: Key of the reach.
-        fields: Names of the fields that differ in any bit.
-        outcomes: Outcome in the library and of the new simulation.
-    """
+    """A row that was not reproduced: fields that differ in any bit, old and new outcome."""
 
     key: str
     fields: tuple[str, ...]

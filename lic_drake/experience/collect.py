@@ -87,9 +87,7 @@ class CollectionRequest:
         return _subsample(self.scenario.goals(self.stream, index), self.max_goals)
 
     def starts(self, environment: int | None = None) -> Starts:
-        """Returns the m initial conditions in an environment, by default the first.
-
-        m is the same in all environments if base and torso of the robot are fixed.
+        """Returns the initial conditions in an environment, by default the first.
 
         Raises:
             RequestError: No start pose is reachable.
@@ -134,19 +132,9 @@ def collect(
     reach: ReachFunction = run_reach,
     progress: ProgressFunction = lambda progress: None,
 ) -> Progress:
-    """Simulates the reaches of a request that a library lacks; see `simulate` for the errors.
+    """Simulates the reaches of a request that a library lacks; arguments and errors as `simulate`.
 
-    Args:
-        library: A folder; created if absent.
-        request: What the library should hold. An existing library accepts only its own request, or
-            that with more environments.
-        workers: Where to simulate; by default in this process.
-        share: Part of the environments to simulate.
-        reach: Simulates a request.
-        progress: Called during the run.
-
-    Raises:
-        LibraryError: The library belongs to another request.
+    An existing library accepts only its own request, or that with more environments.
     """
     library.create()
     # All shares of a job array may start at the same time.
@@ -188,11 +176,7 @@ def _record_request(library: ExperienceLibrary, request: CollectionRequest) -> N
 
 
 def write_request(request: CollectionRequest, path: Path) -> None:
-    """Writes a request as YAML, including the whole scenario.
-
-    Raises:
-        LibraryError: The file cannot be written.
-    """
+    """Writes a request as YAML, including the whole scenario."""
     data = {**_values(request), "scenario": yaml.safe_load(scenario_text(request.scenario))}
     content = "# What `lic collect` puts into this folder; seeds and values are complete.\n"
     content += yaml.safe_dump(data, sort_keys=False)

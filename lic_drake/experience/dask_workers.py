@@ -26,11 +26,7 @@ class DaskWorkers:
     """
 
     def __init__(self, address: str, most: int | None = None) -> None:
-        """Connects to a scheduler.
-
-        Args:
-            address: Its address, for instance tcp://node1:8786.
-            most: Maximum number of workers to use; by default all.
+        """Connects to at most `most` (by default all) workers of the scheduler at an address.
 
         Raises:
             ClusterError: Dask is not installed, or no scheduler answers.
@@ -78,13 +74,12 @@ class DaskWorkers:
                 threads: dict[str, int] = self._client.nthreads()
             except Exception as error:
                 raise self._lost() from error
-            for worker, count in threads.items():
-                if count != 1:
-                    raise ClusterError(
-                        f"the worker {worker} has {count} threads, but a reach needs a process of"
-                        f" its own; start it with: dask worker {self._address} --nworkers {count}"
-                        " --nthreads 1"
-                    )
+            if worker := next((name for name, count in threads.items() if count != 1), None):
+                raise ClusterError(
+                    f"the worker {worker} has {threads[worker]} threads, but reaches need processes"
+                    f" of their own; start it with: dask worker {self._address} --nworkers"
+                    f" {threads[worker]} --nthreads 1"
+                )
             self._count = min(len(threads), self._most or len(threads))
             self._next_look = time.monotonic() + LOOK_S
         return self._count

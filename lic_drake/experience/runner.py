@@ -197,11 +197,7 @@ def shard_name(stream: str, environment: int) -> str:
 def add_to_shard(
     library: ExperienceLibrary, name: str, records: list[ReachRecord], scenario: Scenario
 ) -> None:
-    """Adds records to a shard, which is replaced atomically.
-
-    Raises:
-        LibraryError: The existing shard is damaged, or writing fails.
-    """
+    """Adds records to a shard, which is replaced atomically."""
     path = library.shard_path(name)
     old = to_records(read_shard(path)[1]) if path.exists() else []
     keys = {record.key for record in old}

@@ -1,11 +1,10 @@
 """`ExperienceLibrary`: the library D of the paper (III-A) as a folder of Parquet shards."""
 
-import dataclasses
 import os
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -178,16 +177,11 @@ class ExperienceLibrary:
         return self.path / f"{name}{SUFFIX}"
 
     def write_shard(self, name: str, records: Sequence[ReachRecord], scenario: Scenario) -> Path:
-        """Writes a shard, replacing one of the same name as a whole, and returns its path.
-
-        Args:
-            name: File name without suffix, starting with a letter or digit.
-            records: The rows.
-            scenario: Their scenario.
+        """Writes records of a scenario to a new or replaced shard, atomically; returns its path.
 
         Raises:
-            LibraryError: The folder cannot be written (permission, disk full), or a record
-                belongs to another scenario.
+            LibraryError: The folder cannot be written (permission, disk full), the name is not a
+                plain file name, or a record belongs to another scenario.
         """
         if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,200}", name):
             raise LibraryError(f"{name!r} cannot be a shard's name; use letters and digits")
@@ -271,15 +265,15 @@ def merge_libraries(sources: Sequence[ExperienceLibrary], output: Path) -> int:
     header = sources[0].header()
     merged: dict[str, ReachRecord] = {}
     for source in sources:
-        digest = source.header().scenario_digest
-        if digest != header.scenario_digest:
+        if (digest := source.header().scenario_digest) != header.scenario_digest:
             raise LibraryError(
                 f"{source.path} holds scenario {digest}, but {sources[0].path} holds"
                 f" {header.scenario_digest}; merge libraries of one scenario only"
             )
         for record in source.records():
             earlier = merged.setdefault(record.key, record)
-            if _content(earlier) != _content(record):
+            # As text, so that NaN equals NaN; wall times may differ.
+            if repr(replace(record, wall_time_s=earlier.wall_time_s)) != repr(earlier):
                 raise LibraryError(
                     f"{source.path} holds another result of reach {record.key} than an earlier"
                     " library; find out which one is right before merging"
@@ -294,8 +288,3 @@ def merge_libraries(sources: Sequence[ExperienceLibrary], output: Path) -> int:
 def _write_records(path: Path, records: Sequence[ReachRecord], header: TableHeader) -> None:
     table = to_table(records, header)
     write_atomically(path, lambda temporary: write_table(table, temporary))
-
-
-def _content(record: ReachRecord) -> str:
-    """Returns everything but the wall time, as text so that NaN equals NaN."""
-    return repr(dataclasses.replace(record, wall_time_s=0.0))

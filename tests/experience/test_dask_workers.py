@@ -10,7 +10,7 @@ import pytest
 
 pytest.importorskip("distributed", reason="Dask is missing: pip install 'lic_drake[cluster]'")
 
-from support.collecting import Start, check, collections, wait_until
+from support.collecting import Start, check, wait_until
 from support.dask_cluster import DaskCluster, dask_cluster
 from support.fake_reach import FakeReach, comparable, expected_records, make_request
 
@@ -26,25 +26,9 @@ REACHES = REQUEST.reaches(0)
 
 @pytest.fixture(scope="module")
 def dask() -> Iterator[DaskCluster]:
-    """A scheduler with two workers, which nannies start again when they die."""
+    """A scheduler with two workers, which nannies restart."""
     with dask_cluster(workers=2) as cluster:
         yield cluster
-
-
-@pytest.fixture
-def start() -> Iterator[Start]:
-    with collections() as start:
-        yield start
-
-
-@pytest.fixture
-def library(tmp_path: Path) -> ExperienceLibrary:
-    return ExperienceLibrary(tmp_path / "library")
-
-
-@pytest.fixture
-def reach(tmp_path: Path) -> FakeReach:
-    return FakeReach(log=tmp_path / "calls")
 
 
 def run(dask: DaskCluster, library: ExperienceLibrary, reach: ReachFunction) -> Progress:
@@ -52,7 +36,7 @@ def run(dask: DaskCluster, library: ExperienceLibrary, reach: ReachFunction) -> 
         return collect(library, REQUEST, workers, reach=reach)
 
 
-def test_a_cluster_makes_the_same_library_in_its_own_processes(
+def test_a_cluster_simulates_the_same_library_in_its_own_processes(
     dask: DaskCluster, library: ExperienceLibrary, reach: FakeReach
 ) -> None:
     report = run(dask, library, replace(reach, sleep_s=0.02))
@@ -72,7 +56,7 @@ def test_a_killed_worker_of_a_cluster_costs_only_its_environment(
     assert reach.log.with_suffix(".deaths").read_text() == "x"
 
 
-def test_an_environment_that_aborts_the_interpreter_is_left_out(
+def test_an_environment_that_aborts_the_interpreter_is_abandoned(
     dask: DaskCluster, library: ExperienceLibrary, reach: FakeReach
 ) -> None:
     deadly = replace(reach, deadly=REACHES[7].key, deaths=99, death=signal.SIGABRT)
@@ -84,7 +68,7 @@ def test_an_environment_that_aborts_the_interpreter_is_left_out(
 
 
 @pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGKILL])
-def test_after_an_interrupted_or_killed_collector_the_same_command_goes_on(
+def test_after_an_interrupted_or_killed_collector_the_same_command_resumes(
     dask: DaskCluster, library: ExperienceLibrary, reach: FakeReach, start: Start, end: int
 ) -> None:
     options = ("--scheduler", dask.address)
@@ -103,16 +87,7 @@ def test_after_an_interrupted_or_killed_collector_the_same_command_goes_on(
     assert comparable(library.records()) == expected_records(REQUEST)
 
 
-def test_the_address_of_a_worker_is_not_taken_for_the_schedulers(dask: DaskCluster) -> None:
-    from distributed import Client
-
-    with Client(dask.address, set_as_default=False) as client:
-        worker = next(iter(client.nthreads()))
-    with pytest.raises(ClusterError, match=rf"answers at '{worker}' \(found a Worker\)"):
-        DaskWorkers(worker)
-
-
-def test_a_worker_with_several_threads_is_refused(
+def test_a_worker_with_several_threads_is_rejected(
     dask: DaskCluster, library: ExperienceLibrary, reach: FakeReach
 ) -> None:
     worker = dask.add_workers(1, threads=2)

@@ -25,7 +25,7 @@ def library(tmp_path: Path) -> ExperienceLibrary:
     return library
 
 
-def test_pandas_opens_the_folder_also_while_a_collection_is_at_work(
+def test_pandas_opens_the_folder_even_during_a_collection(
     library: ExperienceLibrary,
 ) -> None:
     write_request(REQUEST, library.path / REQUEST_FILE)
@@ -51,35 +51,24 @@ def test_rows_columns_keys_and_scenario_are_what_was_written(library: Experience
     assert {array.shape for array in columns.values()} == {(len(expected),)}
 
 
-def test_a_single_file_is_a_library_too(library: ExperienceLibrary) -> None:
-    single = ExperienceLibrary(library.path / "training-1.parquet")
-    assert comparable(single.records()) == comparable(RECORDS[1])
-
-
 def names(library: ExperienceLibrary) -> list[str]:
     return sorted(path.name for path in library.path.iterdir())
 
 
-def test_compacting_makes_one_file_of_the_same_rows_and_is_safe_to_repeat(
+def test_compacting_merges_shards_without_duplicates_and_is_idempotent(
     library: ExperienceLibrary,
 ) -> None:
-    write_request(REQUEST, library.path / REQUEST_FILE)
-    before = comparable(library.records())
-    library.compact()
-    assert names(library) == [REQUEST_FILE, f"{COMPACTED}.parquet"]
-    assert sorted(comparable(library.records())) == sorted(before)
-    content = library.shard_path(COMPACTED).read_bytes()
-    library.compact()
-    assert library.shard_path(COMPACTED).read_bytes() == content
-    # With new rows beside it, also such that are there already.
     library.write_shard("new", [*RECORDS[2], RECORDS[0][3]], SCENARIO)
     library.compact()
-    assert names(library) == [REQUEST_FILE, f"{COMPACTED}.parquet"]
+    assert names(library) == [f"{COMPACTED}.parquet"]
     expected = RECORDS[0] + RECORDS[1] + RECORDS[2]
     assert sorted(comparable(library.records())) == sorted(comparable(expected))
     assert library.scenario() == SCENARIO
-    # Rows of an environment stand together.
+    # Rows are grouped by environment.
     assert list(library.columns()["environment"]) == sorted(r.environment for r in expected)
+    content = library.shard_path(COMPACTED).read_bytes()
+    library.compact()
+    assert library.shard_path(COMPACTED).read_bytes() == content
 
 
 def test_a_kill_between_writing_and_deleting_loses_nothing(
@@ -96,7 +85,7 @@ def test_a_kill_between_writing_and_deleting_loses_nothing(
     assert sorted(comparable(library.records())) == sorted(before)
 
 
-def test_a_library_that_is_not_there_or_empty_says_how_to_make_one(tmp_path: Path) -> None:
+def test_missing_and_empty_libraries_are_reported(tmp_path: Path) -> None:
     with pytest.raises(LibraryError, match=r"no experience library at .*; make one with: lic"):
         ExperienceLibrary(tmp_path / "none").successes()
     empty = ExperienceLibrary(tmp_path)
@@ -115,10 +104,10 @@ def test_shards_of_different_scenarios_do_not_mix(library: ExperienceLibrary) ->
         library.records()
 
 
-@pytest.mark.parametrize("name", ["../escape", "a/b", "_hidden", ".hidden", ""])
-def test_a_shard_stays_in_the_folder_and_visible(library: ExperienceLibrary, name: str) -> None:
-    with pytest.raises(LibraryError, match="cannot be a shard's name"):
-        library.write_shard(name, RECORDS[0], SCENARIO)
+def test_shards_are_plain_files_in_the_folder(library: ExperienceLibrary) -> None:
+    for name in ("../escape", "a/b", "_hidden", ".hidden", ""):
+        with pytest.raises(LibraryError, match="cannot be a shard's name"):
+            library.write_shard(name, RECORDS[0], SCENARIO)
 
 
 def test_a_folder_without_write_permission_is_one_clear_error(
@@ -126,7 +115,7 @@ def test_a_folder_without_write_permission_is_one_clear_error(
 ) -> None:
     before = sorted(library.path.iterdir())
     library.path.chmod(0o555)
-    # Root may write anywhere, so the test becomes nobody for a moment.
+    # Root may write anywhere, so run as nobody.
     is_root = os.geteuid() == 0
     if is_root:
         os.seteuid(65534)
@@ -171,7 +160,7 @@ def test_contradictions_and_different_scenarios_are_not_merged(
     assert not (tmp_path / "all.parquet").exists()
 
 
-def test_only_shares_of_one_division_have_the_lock_side_by_side(
+def test_only_shares_of_the_same_collection_may_hold_locks_concurrently(
     library: ExperienceLibrary,
 ) -> None:
     with library.locked(Share(1, 2)), library.locked(Share(2, 2)):

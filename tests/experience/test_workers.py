@@ -2,12 +2,11 @@
 
 import os
 import signal
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from support.collecting import Start, check, collections, is_alive, wait_until
+from support.collecting import Start, check, is_alive, wait_until
 from support.fake_reach import (
     FakeReach,
     comparable,
@@ -24,22 +23,6 @@ REQUEST = make_request()
 REACHES = REQUEST.reaches(0)
 
 
-@pytest.fixture
-def library(tmp_path: Path) -> ExperienceLibrary:
-    return ExperienceLibrary(tmp_path / "library")
-
-
-@pytest.fixture
-def reach(tmp_path: Path) -> FakeReach:
-    return FakeReach(log=tmp_path / "calls")
-
-
-@pytest.fixture
-def start() -> Iterator[Start]:
-    with collections() as start:
-        yield start
-
-
 def test_the_library_does_not_depend_on_the_number_of_workers(
     tmp_path: Path, reach: FakeReach
 ) -> None:
@@ -52,7 +35,7 @@ def test_the_library_does_not_depend_on_the_number_of_workers(
     assert os.getpid() not in reach.processes()
 
 
-def test_a_killed_worker_costs_only_the_environments_under_way(
+def test_a_killed_worker_loses_only_the_environments_in_progress(
     library: ExperienceLibrary, reach: FakeReach
 ) -> None:
     deadly = replace(reach, deadly=REQUEST.reaches(1)[7].key, deaths=1)
@@ -62,7 +45,7 @@ def test_a_killed_worker_costs_only_the_environments_under_way(
     assert reach.log.with_suffix(".deaths").read_text() == "x"
 
 
-def test_a_deadly_environment_is_left_out_and_the_rest_goes_on(
+def test_a_deadly_environment_is_abandoned_and_the_others_finish(
     library: ExperienceLibrary, reach: FakeReach
 ) -> None:
     deadly = replace(reach, deadly=REACHES[7].key, deaths=99)
@@ -76,7 +59,7 @@ def test_a_deadly_environment_is_left_out_and_the_rest_goes_on(
     assert comparable(library.records()) == expected_records(REQUEST)
 
 
-def test_ctrl_c_stops_quietly_and_the_same_command_goes_on(
+def test_ctrl_c_stops_quietly_and_the_same_command_resumes(
     library: ExperienceLibrary, reach: FakeReach, start: Start
 ) -> None:
     slow = replace(reach, sleep_s=0.1)
@@ -115,7 +98,7 @@ def test_a_killed_collection_leaves_no_workers_and_loses_no_finished_environment
     assert comparable(library.records()) == expected_records(REQUEST)
 
 
-def test_of_two_collections_at_once_the_second_is_refused_and_the_first_completes(
+def test_of_two_concurrent_collections_the_second_is_rejected(
     tmp_path: Path, library: ExperienceLibrary, reach: FakeReach, start: Start
 ) -> None:
     hold = tmp_path / "hold"
@@ -133,7 +116,7 @@ def test_of_two_collections_at_once_the_second_is_refused_and_the_first_complete
     assert len(reach.calls()) == len(set(reach.calls())) == 36
 
 
-def test_the_shares_of_a_job_array_fill_one_library_side_by_side(
+def test_shares_of_a_job_array_fill_one_library_concurrently(
     library: ExperienceLibrary, reach: FakeReach, start: Start
 ) -> None:
     slow = replace(reach, sleep_s=0.05)
@@ -146,7 +129,7 @@ def test_the_shares_of_a_job_array_fill_one_library_side_by_side(
     assert check(library.path)["is_sound"]
 
 
-def test_workers_do_their_linear_algebra_on_one_thread(library: ExperienceLibrary) -> None:
+def test_workers_use_one_blas_thread(library: ExperienceLibrary) -> None:
     if (os.cpu_count() or 1) == 1:
         pytest.skip("one CPU: linear algebra has one thread anyway")
     request = make_request(environments=1, max_goals=1, max_starts=1)
