@@ -51,7 +51,7 @@ class Environment:
         self.scenario = scenario
         self.instance = instance
         self.arm = scenario.arm()
-        self.b0 = np.array([0.0, 0.0, scenario.task.torso_m]) if b0 is None else b0
+        self.b0 = scenario.task.b0 if b0 is None else b0
         self._height_m = float(self.b0[2])
         self.arm.check_height(self._height_m)
         self._in_R = instance.translated(-self.b0)

@@ -70,15 +70,20 @@ class ReachRequest:
         return self._key(self.scenario.digest)
 
     def _key(self, digest: str) -> str:
-        """Returns the key for a scenario with a digest."""
-        x0, b0 = self.start.x0.tolist(), self.start.b0.tolist()
+        """Returns the key for a scenario with a digest.
+
+        Quaternions and joint angles carry noise of 1e-17 that differs between machines: in space
+        nine digits count.
+        """
+        x0, b0 = _significant(self.start.x0), self.start.b0.tolist()
         content: list[object] = [digest, self.stream, self.environment, self.goal.tolist(), x0]
         # Left out where the base stands at the origin, as in a library of a fixed base.
         if b0[:2] != [0.0, 0.0] or self.after:
-            content += [b0[:2], [(s.x0.tolist(), s.b0[:2].tolist()) for s in self.after]]
+            content += [b0[:2], [(_significant(s.x0), s.b0[:2].tolist()) for s in self.after]]
         if len(x0) == IN_SPACE:
             content += [b0[2], [float(s.b0[2]) for s in self.after]]
-        prescribed = [None if s.q is None else s.q.tolist() for s in (self.start, *self.after)]
+        starts = (self.start, *self.after)
+        prescribed = [None if s.q is None else _rounded(s.q) for s in starts]
         if any(prescribed):
             content.append(prescribed)
         return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
@@ -107,6 +112,15 @@ class ReachRequest:
     def then(self, start: Start) -> "ReachRequest":
         """Returns the request of a further reach to the same goal from another start."""
         return replace(self, start=start, after=(*self.after, self.start))
+
+
+def _significant(x0: Vector) -> list[float]:
+    """Returns the numbers of a hand pose that tell it from others."""
+    return x0.tolist() if len(x0) == IN_PLANE else _rounded(x0)
+
+
+def _rounded(values: Vector) -> list[float]:
+    return (np.round(values, 9) + 0.0).tolist()
 
 
 def _checked(scenario: Scenario, start: Start) -> Start:

@@ -164,6 +164,11 @@ class Task:
     # None: the goal is the one that each environment offers (passage-clutter).
     goal_area: GoalArea | None = field(default_factory=GoalArea)
 
+    @property
+    def b0(self) -> Vector:
+        """Base and torso where they have no reason to move, (x, y, torso), shape (3,), metres."""
+        return np.array([0.0, 0.0, self.torso_m])
+
 
 def _check_range(name: str, low: float, high: float, step: float) -> None:
     if not np.all(np.isfinite([low, high, step])) or high < low or step <= 0.0:

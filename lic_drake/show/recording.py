@@ -88,7 +88,7 @@ class Recording:
         self._frames_per_second = frame_rate(scenario.mpc.rate_hz)
         self._springs_back = instance.stems is not None
         self._clock_s = 0.0
-        self._b0 = np.array([0.0, 0.0, scenario.task.torso_m])
+        self._b0 = scenario.task.b0
         initial = scene.plant.GetDefaultPositions(scene.arm)[3:]
         self._q: Vector = initial if approach is None else approach.waiting
         self._set_up_view()

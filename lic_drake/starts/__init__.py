@@ -76,7 +76,7 @@ def board_starts(
             f" sphere-aperture-clutter; {scenario.category} with {scenario.robot} has other starts"
         )
     stand = scenario.task.stand
-    low = high = np.array([0.0, 0.0, scenario.task.torso_m]) if b0 is None else b0
+    low = high = scenario.task.b0 if b0 is None else b0
     if moves and stand is not None:
         low = np.array([0.0, stand.y_min_m, stand.torso_min_m])
         high = np.array([0.0, stand.y_max_m, stand.torso_max_m])

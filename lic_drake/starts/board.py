@@ -93,7 +93,7 @@ class BoardStarts(FeasibleStarts):
     @property
     def home(self) -> Vector:
         """Base and torso where the task has them, shape (3,), metres."""
-        return np.array([0.0, 0.0, self.scenario.task.torso_m])
+        return self.scenario.task.b0
 
     @cached_property
     def checker(self) -> CollisionChecker:

@@ -77,10 +77,11 @@ def check_rows(category: str, count: int, pool: ProcessPoolExecutor) -> bool:
         f" (largest {apart.max():.1e})",
         flush=True,
     )
-    for row, ok in zip(rows, within if category in SPATIAL else same, strict=True):
+    holds = outcome if category in SPATIAL else same
+    for row, ok in zip(rows, holds, strict=True):
         if not ok:
             print(f"  {row['key']} {row['outcome']}")
-    return bool(np.all(within if category in SPATIAL else same))
+    return bool(np.all(holds))
 
 
 def check_selections(category: str, count: int, pool: ProcessPoolExecutor) -> bool:
