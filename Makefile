@@ -21,9 +21,12 @@ lint: $(STAMP)
 	$(PYTHON_IN_VENV) -m ruff format --check .
 	$(PYTHON_IN_VENV) -m mypy
 
+# The top level exports the API only, so its rooms are named for pdoc.
+ROOMS = $(subst /,.,$(patsubst %/__init__.py,%,$(wildcard lic_drake/*/__init__.py)))
+
 # Reference pages from the docstrings, out/docs/index.html; a warning is an error.
 docs: $(STAMP)
-	$(PYTHON_IN_VENV) -W error -m pdoc --docformat google --output-directory out/docs lic_drake
+	$(PYTHON_IN_VENV) -W error -m pdoc --docformat google --output-directory out/docs lic_drake $(ROOMS)
 
 # All notebooks, run as they are, with their outputs in out/notebooks; one that fails is an error.
 notebooks: $(STAMP)

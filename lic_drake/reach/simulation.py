@@ -146,7 +146,7 @@ class Cache[T]:
 
     def __init__(self, size: int) -> None:
         self.size = size
-        self._items: OrderedDict[Hashable, T] = OrderedDict()
+        self._items = OrderedDict[Hashable, T]()
 
     def __len__(self) -> int:
         return len(self._items)
