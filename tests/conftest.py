@@ -40,3 +40,14 @@ def _renderer() -> None:
         make_renderer()
     except RenderingError as error:
         pytest.skip(str(error))
+
+
+@pytest.fixture
+def registries_restored(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the test registers is forgotten afterwards."""
+    from lic_drake.clutter import registry as clutter
+    from lic_drake.estimate import registry as estimate
+    from lic_drake.robots import registry as robots
+
+    for registry in (clutter._CATEGORIES, robots._ROBOTS, estimate._ESTIMATORS):
+        monkeypatch.setattr(registry, "entries", dict(registry.entries))

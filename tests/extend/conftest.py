@@ -9,23 +9,15 @@ from types import ModuleType
 
 import pytest
 
-from lic_drake.clutter import registry as clutter
-from lic_drake.estimate import registry as estimate
-from lic_drake.robots import registry as robots
-
 EXTEND = Path(__file__).resolve().parents[2] / "notebooks" / "extend"
 NAMES = ("shelf", "long_arm", "boosting")
 
 
 @pytest.fixture
-def extend(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, ModuleType]]:
+def extend(
+    registries_restored: None, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[dict[str, ModuleType]]:
     """The modules by name, registered until the end of the test."""
-    for registry in (
-        clutter._CATEGORIES,
-        robots._ROBOTS,
-        estimate._ESTIMATORS,
-    ):
-        monkeypatch.setattr(registry, "entries", dict(registry.entries))
     monkeypatch.syspath_prepend(EXTEND)
     yield {name: import_module(name) for name in NAMES}
     for name in NAMES:

@@ -1,0 +1,1 @@
+"""One-screen programs with the public API."""
