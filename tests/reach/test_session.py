@@ -114,7 +114,7 @@ def test_given_joint_angles_are_executed_if_they_bring_the_hand_to_its_start() -
     record = run_reach(replace(request, start=Start(X0, q=q + [3e-5, 0.0, 0.0])))
     np.testing.assert_array_equal(record.q_start, q + [3e-5, 0.0, 0.0])
     record = run_reach(replace(request, start=Start(X0, q=q + [1e-3, 0.0, 0.0])))
-    assert_never_began(record, "invalid_start")
+    assert_never_began(record, "invalid_start", q + [1e-3, 0.0, 0.0])
     assert record.detail == "the joint angles do not bring the hand to x0"
 
 

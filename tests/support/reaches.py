@@ -1,6 +1,7 @@
 """Real reaches for tests: small scenarios, requests for them, and where a hand can start."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from pydrake.systems.framework import Context
@@ -71,7 +72,7 @@ MEASURED = (
 )
 
 
-def assert_never_began(record: ReachRecord, outcome: str) -> None:
+def assert_never_began(record: ReachRecord, outcome: str, q: Sequence[float] = ()) -> None:
     assert (record.outcome, record.success, record.duration_s) == (outcome, False, 0.0)
     assert all(math.isnan(getattr(record, name)) for name in MEASURED)
-    assert (record.q_start, record.q_final, record.peak_contacts) == ((), (), 0)
+    assert (record.q_start, record.q_final, record.peak_contacts) == (tuple(q), (), 0)
