@@ -2,6 +2,7 @@
 
 import time
 from collections import Counter
+from itertools import product
 
 import numpy as np
 
@@ -13,13 +14,11 @@ from lic_drake.select.situation import FailedReach, Selection, Situation
 from lic_drake.starts import Region, find_regions
 from lic_drake.types import Vector
 
-RISE_PER_M = 5.0
-"""How fast an estimate may rise with the distance from a candidate: neighbours are evaluated where
-it could exceed the best. An L1 kernel has kinks, at which a solver stops: solved from the best
-place of each aperture alone, it ended below the best of 20,000 samples in every fifth situation."""
+FIRST_STEP = 1.0 / 16.0
+"""First step of a pattern search, as a share of the region's width."""
 
-MAX_REFINED = 150
-"""Number of best candidates whose neighbours are evaluated."""
+SMALLEST_STEP = 1e-6
+"""A pattern search ends at this share of the region's width."""
 
 MAX_TRIED = 40
 """Number of candidates of a region that are tried, best first, until one is feasible."""
@@ -32,7 +31,7 @@ VIOLATED = 1e6
 
 
 class _Best:
-    """The best start found so far that satisfies all constraints of a program."""
+    """The best start found so far that satisfies a program and is away from failed ones."""
 
     def __init__(self, program: LicProgram) -> None:
         self._program = program
@@ -43,9 +42,41 @@ class _Best:
         """Takes a start if it is better."""
         if start is None:
             return
-        value = float(self._program.values(Starts.of(start))[0])
-        if value > self.value + LEAST_GAIN and self._program.satisfied(Starts.of(start))[0]:
+        asked, program = Starts.of(start), self._program
+        value = float(program.values(asked)[0])
+        if value <= self.value + LEAST_GAIN or not program.satisfied(asked)[0]:
+            return
+        if program.objective.failed or program.situation.allowed(asked)[0]:
             self.start, self.value = start, value
+
+
+def climb(program: LicProgram, region: Region, best: _Best) -> None:
+    """Improves a start by a pattern search over hand, base and torso within a region.
+
+    An L1 kernel and K-NN have kinks, on which a solver that follows gradients stops early.
+    """
+    starts = program.situation.starts
+    widths = region.upper[:3] - region.lower[:3], region.b0_upper - region.b0_lower
+    width = np.concatenate(widths)
+    free = np.flatnonzero(width > SMALLEST_STEP)
+    steps = np.zeros((3 ** len(free), 6))
+    steps[:, free] = width[free] * list(product((-1.0, 0.0, 1.0), repeat=len(free)))
+    scale = FIRST_STEP
+    while best.start is not None and scale > SMALLEST_STEP:
+        before = best.value
+        x0 = np.tile(best.start.x0, (len(steps), 1))
+        x0[:, :3] += scale * steps[:, :3]
+        x0 = np.clip(x0, region.lower, region.upper)
+        b0 = np.round(best.start.b0 + scale * steps[:, 3:], 6)
+        b0 = np.clip(b0, region.b0_lower, region.b0_upper)
+        values = program.values(Starts(x0, b0))
+        for k in np.argsort(-values, kind="stable"):
+            if values[k] <= before + LEAST_GAIN or best.value > before:
+                break
+            q = starts.solve(x0[k], b0[k], near=best.start.q)
+            best.consider(None if q is None else Start(x0[k], b0[k], q))
+        if best.value == before:
+            scale *= 0.5
 
 
 class LicSelector:
@@ -54,10 +85,10 @@ class LicSelector:
     A first attempt is chosen with LIC-1, a further one with LIC-2, which knows how the attempts
     before it failed. Without LIC-2, further attempts are LIC-1's best away from the failed ones.
 
-    Candidates are compared first: the discrete starts, a lattice between them and, before a board,
-    neighbours of the best ones. A `LicProgram` is then solved from the best, and the answer is the
-    best feasible start of all, whatever the solver reports. Most is found by the lattice: in the
-    plane the program adds 0.2 to 2.7 points, before a board nothing (scripts/selection/README.md).
+    Candidates are compared first: the discrete starts and a lattice between them. From the best a
+    `LicProgram` is solved, and a pattern search goes on from where it ends, because estimates have
+    kinks; the answer is the best feasible start of all, whatever the solver reports. Who finds what
+    is in scripts/selection/README.md.
     """
 
     def __init__(
@@ -109,8 +140,8 @@ class LicSelector:
     def search(self, program: LicProgram) -> tuple[Starts, Vector]:
         """Returns n candidates, the discrete starts first, and their values, shape (n,).
 
-        After those come a lattice and neighbours, denser where values are high. Candidates without
-        joint angles may be infeasible. The value of a forbidden one is -inf.
+        After those comes a lattice. Candidates without joint angles may be infeasible. The value of
+        a forbidden one is -inf.
         """
         starts = program.situation.starts
         grid = starts.grid
@@ -118,14 +149,7 @@ class LicSelector:
         if np.all(of_grid == -np.inf):
             return grid, of_grid
         places = starts.lattice(of_grid)
-        values = self._values(program, places)
-        for step_m in starts.effort.steps_m:
-            high = np.argsort(-values, kind="stable")[:MAX_REFINED]
-            high = high[values[high] > values.max() - RISE_PER_M * 2.0 * step_m]
-            nearby = starts.neighbours(places.take(high), step_m)
-            places = places.join(nearby)
-            values = np.append(values, self._values(program, nearby))
-        return grid.join(places), np.append(of_grid, values)
+        return grid.join(places), np.append(of_grid, self._values(program, places))
 
     def improve(self, program: LicProgram, region: Region, start: Start) -> Start | None:
         """Returns where the optimisation ends from a start, None if the arm cannot be near there.
@@ -135,7 +159,11 @@ class LicSelector:
             region: A region that holds the start.
             start: Where to begin, with joint angles.
         """
-        return program.situation.starts.snap(region, program.solve(region, start))
+        best = _Best(program)
+        best.consider(start)
+        best.consider(program.situation.starts.snap(region, program.solve(region, start)))
+        climb(program, region, best)
+        return best.start
 
     def _best(self, program: LicProgram) -> Start:
         """Returns the best feasible start found.

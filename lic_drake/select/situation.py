@@ -15,9 +15,9 @@ from lic_drake.starts import FeasibleStarts, Region
 from lic_drake.types import BoolVector, Vector
 
 RETRY_DISTANCES_M = (0.1, 0.05, 0.025, 0.0, -1.0)
-"""A further attempt starts more than the first of these from all failed ones across x: the "local
-neighborhood" of paper VI-A, whose size it does not state; one grid step. Where that leaves no
-start, after many failures, the next of them counts; -1 excludes nothing."""
+"""A further attempt starts more than the first of these from all failed ones, with the hand across
+x or, in space, with base and torso: the "local neighborhood" of paper VI-A, whose size it does not
+state; one grid step. Where that leaves no start, the next of them counts; -1 excludes nothing."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +68,7 @@ class Situation:
 
     @cached_property
     def retry_distance_m(self) -> float:
-        """How far from failed attempts a further one starts, across x, metres."""
+        """How far from failed attempts a further one starts, metres."""
         return next(
             (d for d in RETRY_DISTANCES_M if np.any(self._away(self.starts.grid, d))),
             RETRY_DISTANCES_M[-1],
@@ -86,8 +86,11 @@ class Situation:
         return self._away(some, RETRY_DISTANCES_M[-1])
 
     def free_regions(self) -> tuple[Region, ...]:
-        """Returns the parts of the regions that are away from all failed attempts."""
-        if self.retry_distance_m < 0.0 or not self.failed:
+        """Returns the parts of the regions that are away from all failed attempts.
+
+        In space these are all of them: a failed aperture may be tried from another base.
+        """
+        if self.retry_distance_m < 0.0 or not self.failed or not self.starts.arm.is_planar:
             return self.starts.regions
         failed = [reach.start for reach in self.failed]
         margin = self.retry_distance_m + 1e-6
@@ -102,6 +105,8 @@ class Situation:
             away &= ~(same_pose & np.all(np.isclose(some.b0, failed.b0), axis=1))
             across = slice(1, 2 if len(failed.x0) == IN_PLANE else 3)
             apart = np.linalg.norm(some.x0[:, across] - failed.x0[across], axis=1)
+            if len(failed.x0) != IN_PLANE:
+                apart = np.maximum(apart, np.linalg.norm(some.b0 - failed.b0, axis=1))
             away &= apart > distance_m + 1e-9
         return away
 

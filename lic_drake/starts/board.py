@@ -55,9 +55,7 @@ class BoardStarts(FeasibleStarts):
     b0_upper: Vector
     probability_open: Vector | None = None
 
-    effort = Effort(
-        steps_m=(0.0125, 0.00625, 0.003125), solves=100, solves_per_region=1, max_gain=0.02
-    )
+    effort = Effort(solves=100, solves_per_region=1, max_gain=0.06)
 
     @property
     def arm(self) -> Arm:
@@ -138,15 +136,6 @@ class BoardStarts(FeasibleStarts):
             b0 = np.array([[self.b0_lower[0], *place] for place in product(y, torso)])
             found = found.join(Starts(np.tile(x0, (len(b0), 1)), b0))
         return found
-
-    def neighbours(self, some: Starts, step_m: float) -> Starts:
-        """Returns the eight neighbours of each base and torso height, each once."""
-        steps = np.array([[0.0, *s] for s in product((-step_m, 0.0, step_m), repeat=2) if any(s)])
-        b0 = np.clip(some.b0[:, None] + steps, self.b0_lower, self.b0_upper)
-        b0 = np.round(b0, _DECIMALS).reshape(-1, 3)
-        x0 = np.repeat(some.x0, len(steps), axis=0)
-        _, first = np.unique(np.hstack([x0, b0]), axis=0, return_index=True)
-        return Starts(x0[first], b0[first])
 
     def solve(self, x0: Vector, b0: Vector, near: Vector | None = None) -> Vector | None:
         """Returns joint angles for a hand pose from a base, else None; see `FeasibleStarts`."""

@@ -16,14 +16,11 @@ class Effort(NamedTuple):
     """How thoroughly a selection searches among feasible starts.
 
     Attributes:
-        steps_m: Distances, in turn, at which neighbours of good candidates are evaluated, metres;
-            empty where the lattice is dense enough.
         solves: Number of candidates from which the program is solved.
         solves_per_region: The same in each region.
         max_gain: A region is skipped if its best candidate is this much below the best so far.
     """
 
-    steps_m: tuple[float, ...] = ()
     solves: int = 6
     solves_per_region: int = 6
     max_gain: float = np.inf
@@ -85,10 +82,6 @@ class FeasibleStarts(ABC):
     def home(self) -> Vector | None:
         """Base and torso from which the robot prefers not to move, shape (3,), metres, if any."""
         return None
-
-    def neighbours(self, some: Starts, step_m: float) -> Starts:
-        """Returns candidates a step away from some; none by default."""
-        return some.take(np.zeros(0, dtype=int))
 
     def chance(self, x0: Vector) -> Vector:
         """Returns the probability that n hand poses are feasible, shape (n,); 1 by default."""

@@ -64,18 +64,10 @@ class Region:
         return np.array([np.cos(middle), np.sin(middle), 0.0]), float(0.5 * (high - low))
 
     def away_from(self, failed: Iterable[Start], distance_m: float) -> "list[Region]":
-        """Returns the parts whose hands are further than a distance from failed ones, across x.
-
-        The hand's position must be one point, or free along y alone.
-        """
-        low, high = self.position
+        """Returns what is left of a region in the plane away from failed hands in y."""
         parts = [self]
         for start in failed:
-            hand = start.x0[:3] if len(start.x0) > IN_PLANE else np.append(start.x0[:2], 0.0)
-            if np.array_equal(low, high):
-                parts = [] if np.linalg.norm((hand - low)[1:]) <= distance_m else parts
-                continue
-            ends = hand[1] - distance_m, hand[1] + distance_m
+            ends = start.x0[1] - distance_m, start.x0[1] + distance_m
             parts = [cut for part in parts for cut in part._without(*ends)]
         return parts
 

@@ -34,10 +34,19 @@ class SearchSelector(LicSelector):
         return None
 
 
+class ProgramSelector(LicSelector):
+    """LIC without the pattern search."""
+
+    def improve(self, program: LicProgram, region: Region, start: Start) -> Start | None:
+        """Returns where the program ends from a start."""
+        return program.situation.starts.snap(region, program.solve(region, start))
+
+
 STAGES = {
     "lattice": SearchSelector,
     "L-BFGS-B": LbfgsbSelector,
-    "program": LicSelector,
+    "program": ProgramSelector,
+    "program, pattern search": LicSelector,
 }
 """What makes a selection."""
 

@@ -31,5 +31,5 @@ def test_a_table_says_who_found_what(
     assert run.main() == 0
     rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith("| knn")]
     assert [row.split(" | ")[1] for row in rows] == [
-        *("discrete", "samples", "lattice", "L-BFGS-B", "program")
+        *("discrete", "samples", "lattice", "L-BFGS-B", "program", "program, pattern search")
     ]

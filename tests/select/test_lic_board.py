@@ -87,25 +87,6 @@ def test_a_pr2s_selection_is_better_than_random_samples_and_gains_over_the_grid(
     assert max(gains) > 0.02
 
 
-def test_a_peak_between_places_of_the_lattice_is_found() -> None:
-    """The lattice's best place is on a hill of 0.93; beside its places stands a peak of 1."""
-
-    class Peaks(Bumps):
-        def __init__(self) -> None:
-            pass
-
-        def _values(self, X: np.ndarray) -> np.ndarray:
-            hill = 0.93 - 2.0 * np.abs(X[:, 2:4] - [-0.24, 0.9]).sum(axis=1)
-            return np.maximum(hill, 1.0 - 8.0 * np.abs(X[:, 2:4] - [-0.3235, 0.851]).sum(axis=1))
-
-        def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
-            return float(self.values(x[None])[0]), np.zeros(5)
-
-    model = SuccessModel(estimator=Peaks(), features=ROLLING)
-    chosen = LicSelector(model).select(before_board(3))
-    assert chosen.probability == pytest.approx(1.0, abs=0.03)
-
-
 def test_a_translated_board_has_a_translated_answer() -> None:
     """Board, goal and the range of the base move 0.1 m to the left: so does the answer."""
     text = "{{clutter: {{board_centre: [0.53, {0}, 0.89]}}, task: {{stand: {{y_min_m: {1},"

@@ -103,40 +103,38 @@ def test_a_failed_reach_shows_what_its_record_says_in_the_world(y_m: float) -> N
 
 
 class InSpace:
-    """Tools at three heights and two places across x, each from two heights of the torso."""
+    """Hands at three heights and two places across x, each from two heights of the torso."""
 
     def __init__(self) -> None:
         places = [(y, z) for y in (-0.3, 0.1) for z in (0.7, 0.9, 1.1)]
         x0 = np.array([[0.53, y, z, 1.0, 0.0, 0.0, 0.0] for y, z in places])
-        torso_m = np.repeat([0.1, 0.2], len(x0))
+        torso_m = np.repeat([0.1, 0.25], len(x0))
         self.grid = Starts(np.vstack([x0, x0]), np.pad(torso_m[:, None], ((0, 0), (2, 0))))
 
 
-def test_in_space_starts_keep_their_distance_across_x_in_both_directions() -> None:
+def test_in_space_a_failed_aperture_is_tried_again_from_elsewhere_only() -> None:
     starts = InSpace()
-    at = np.array([0.53, -0.3, 0.9, 1.0, 0.0, 0.0, 0.0])
+    at = Start(np.array([0.53, -0.3, 0.9, 1.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, 0.1]))
     near = np.linalg.norm(starts.grid.x0[:, 1:3] - [-0.3, 0.9], axis=1) <= 0.1
-    assert np.count_nonzero(near) == 2  # The same place from both heights of the torso.
-    situation = Situation(
-        p_WG=GOAL,
-        starts=starts,
-        failed=(FailedReach.from_start(Start(at, np.array([0.0, 0.0, 0.1]))),),
-    )
+    near &= starts.grid.b0[:, 2] == 0.1
+    assert np.count_nonzero(near) == 1
+    failed = (FailedReach.from_start(at),)
+    situation = Situation(p_WG=GOAL, starts=starts, failed=failed)
     np.testing.assert_array_equal(situation.allowed(starts.grid), ~near)
-    # Deeper or further up the way makes no difference.
+    # Deeper makes no difference.
     deeper = Starts(starts.grid.x0 + np.eye(7)[0], starts.grid.b0)
     np.testing.assert_array_equal(situation.allowed(deeper), ~near)
 
 
-def test_the_same_pose_from_another_torso_is_another_start() -> None:
+def test_all_that_did_not_fail_may_be_tried_where_no_place_is_left_at_a_distance() -> None:
     starts = InSpace()
+    starts.grid.b0[6:, 2] = 0.1
+    starts.grid.x0[6:, 0] += 0.01
     failed = tuple(FailedReach.from_start(starts.grid[i]) for i in range(6))
     situation = Situation(p_WG=GOAL, starts=starts, failed=failed)
-    from_above = starts.grid.b0[:, 2] == 0.2
-    np.testing.assert_array_equal(situation.untried(starts.grid), from_above)
-    # No place is left at a distance, so that all that did not fail may be tried.
     assert situation.retry_distance_m == -1.0
-    np.testing.assert_array_equal(situation.allowed(starts.grid), from_above)
+    np.testing.assert_array_equal(situation.allowed(starts.grid), np.arange(12) >= 6)
+    np.testing.assert_array_equal(situation.untried(starts.grid), np.arange(12) >= 6)
 
 
 def test_a_failure_in_space_is_known_by_position_quaternion_and_torso() -> None:

@@ -43,12 +43,6 @@ def test_a_line_without_the_neighbourhood_of_failures(failed_y: list[float]) -> 
         assert any(part.holds(x0, np.zeros(3), 0.0) for part in parts) == free
 
 
-def test_an_aperture_is_away_from_failures_or_not() -> None:
-    near, far = (Start(np.array([0.5, 0.1, z, 1.0, 0.0, 0.0, 0.0])) for z in (0.95, 1.1))
-    assert APERTURE.away_from([far], 0.1) == [APERTURE]
-    assert APERTURE.away_from([far, near], 0.1) == []
-
-
 def test_each_start_is_found_in_its_region() -> None:
     grid = APERTURES.grid
     found = find_regions(APERTURES.regions, grid)
