@@ -1,6 +1,7 @@
 """The rules that keep the package installable from its metadata and its files."""
 
 import ast
+import re
 import shutil
 import subprocess
 import sys
@@ -77,6 +78,14 @@ def test_modules_import_only_declared_distributions() -> None:
 def test_the_models_folder_is_the_checkouts_own_and_has_scenarios() -> None:
     assert models_dir() == CHECKOUT / "models"
     assert list((models_dir() / "scenarios").glob("*.yaml"))
+
+
+def test_pages_link_to_files_that_exist() -> None:
+    pages = [p for p in CHECKOUT.rglob("*.md") if not {".venv", "out"} & set(p.parts)]
+    assert len(pages) > 20
+    for page in pages:
+        for link in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
+            assert (page.parent / link).exists(), f"{page}: {link}"
 
 
 def test_no_file_in_models_is_ignored_by_git(tmp_path: Path) -> None:
