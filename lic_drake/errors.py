@@ -1,5 +1,9 @@
 """Exceptions for user errors; the command line prints them as one line."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
 
 class LicError(Exception):
     """Base class; messages name the value, the limit and the remedy."""
@@ -42,3 +46,30 @@ def quoted(value: object) -> str:
     text = str(value)
     short = text if len(text) <= 40 else f"{text[:40]}..."
     return short if short.isprintable() else ascii(short)
+
+
+@contextmanager
+def readable_errors(path: Path, action: str) -> Iterator[None]:
+    """Turns system errors (no permission, disk full) of an action on a path into a `LibraryError`.
+
+    The action goes into the message: "write", "create the folder".
+    """
+    try:
+        yield
+    except OSError as error:
+        raise LibraryError(
+            f"cannot {action} {path}: {error.strerror or error}; check free space and permissions"
+        ) from error
+
+
+def check_writable(folder: Path) -> None:
+    """Creates a folder and checks that it is writable, before any work starts.
+
+    Raises:
+        LibraryError: It is not.
+    """
+    with readable_errors(folder, "write into"):
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / ".write-test"
+        probe.touch()
+        probe.unlink()

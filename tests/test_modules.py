@@ -170,4 +170,4 @@ def test_nothing_that_is_read_can_be_executed_or_unpickled() -> None:
         if forbidden.search((PACKAGE / path).read_text(encoding="utf-8"))
     }
     # Messages between the collector and its own workers, no files.
-    assert found <= {"experience/dask_workers.py"}
+    assert found <= {"experience/workers.py"}

@@ -104,8 +104,7 @@ def add_workers_arguments(parser: argparse.ArgumentParser) -> None:
 @contextmanager
 def workers_of(args: argparse.Namespace) -> "Iterator[Workers]":
     """Gives the workers that --workers and --scheduler ask for."""
-    from lic_drake.experience.dask_workers import DaskWorkers
-    from lic_drake.experience.workers import LocalWorkers
+    from lic_drake.experience.workers import DaskWorkers, LocalWorkers
 
     if args.scheduler is None:
         with LocalWorkers(args.workers) as local:

@@ -92,10 +92,10 @@ def add_parser(subparsers: Subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Collects; returns 0 when the library is complete, 1 when environments failed."""
     from lic_drake.experience.collect import collect
-    from lic_drake.experience.store import ExperienceLibrary, Share
+    from lic_drake.experience.store import ExperienceLibrary
 
-    request, share = _make_request(args), Share.parse(args.share)
-    environments = len(share.of(request.environment_indices))
+    request, share = _make_request(args), args.share
+    environments = len(request.environments_of(share))
     goals, starts, total = len(request.goals()), len(request.starts()), request.num_reaches(share)
     about = "" if total == environments * goals * starts else "about "
     print(

@@ -1,19 +1,15 @@
 """`lic experience`: looks at, checks, recomputes, merges and adds to experience libraries."""
 
 import argparse
-import dataclasses
 import json
 import os
 import shlex
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from lic_drake.cli import exit_codes
 from lic_drake.cli.arguments import Subparsers, add_json_argument, library_path, positive_int
-
-if TYPE_CHECKING:
-    from lic_drake.experience.check import LibraryReport, LibrarySummary
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -139,8 +135,7 @@ def run_info(args: argparse.Namespace) -> int:
 
     summary = summarize(ExperienceLibrary(args.library))
     if args.json:
-        values = dataclasses.asdict(summary)
-        print(json.dumps(values, indent=2))
+        print(json.dumps(summary, indent=2))
     else:
         print("\n".join(_lines(args.library, summary)))
     return 0
@@ -156,10 +151,10 @@ def run_check(args: argparse.Namespace) -> int:
     request = read_request(path) if os.path.exists(path) else None
     report = check_library(ExperienceLibrary(args.library), request)
     if args.json:
-        print(json.dumps({**dataclasses.asdict(report), "is_sound": report.is_sound}, indent=2))
+        print(json.dumps(report, indent=2))
     else:
         print("\n".join(_check_lines(report, args.library)))
-    return 0 if report.is_sound else exit_codes.INCOMPLETE
+    return 0 if report["is_sound"] else exit_codes.INCOMPLETE
 
 
 def run_recompute(args: argparse.Namespace) -> int:
@@ -170,18 +165,13 @@ def run_recompute(args: argparse.Namespace) -> int:
     from lic_drake.experience.check import recompute
     from lic_drake.experience.store import ExperienceLibrary
 
-    with tqdm(total=args.rows, disable=None, unit="rows") as bar:
-
-        def show(done: int, total: int) -> None:
-            bar.total, bar.n = total, done
-            bar.refresh()
-
-        library, rng = ExperienceLibrary(args.library), np.random.default_rng(args.seed)
-        differing = recompute(library, args.rows, rng, progress=show)
-        rows = int(bar.n)
-    print(f"{rows - len(differing)} of {rows} rows are the same to the last bit")
-    for row in differing:
-        print(f"{row.key}: {' -> '.join(row.outcomes)}, other {', '.join(row.fields)}")
+    library, rng = ExperienceLibrary(args.library), np.random.default_rng(args.seed)
+    rows = recompute(library, args.rows, rng)
+    compared = list(tqdm(rows, total=args.rows, disable=None, unit="rows"))
+    differing = [result for result in compared if result[2]]
+    print(f"{len(compared) - len(differing)} of {len(compared)} rows are the same to the last bit")
+    for old, new, names in differing:
+        print(f"{old.key}: {old.outcome} -> {new.outcome}, other {', '.join(names)}")
     return exit_codes.INCOMPLETE if differing else 0
 
 
@@ -196,11 +186,11 @@ def run_merge(args: argparse.Namespace) -> int:
 
 def run_add(args: argparse.Namespace) -> int:
     """Adds the rows of a file."""
-    from lic_drake.experience.add import add_file
+    from lic_drake.experience.add import add_rows, read_rows
     from lic_drake.experience.store import ExperienceLibrary
 
     library = ExperienceLibrary(args.library)
-    rows = add_file(library, args.file, source=args.source, weight=args.weight)
+    rows = add_rows(library, read_rows(args.file), source=args.source, weight=args.weight)
     successes, path = sum(row.success for row in rows), library.shard_path(rows[0].stream)
     if args.json:
         print(json.dumps({"rows": len(rows), "successes": successes, "path": str(path)}))
@@ -212,69 +202,67 @@ def run_add(args: argparse.Namespace) -> int:
     return 0
 
 
-def _check_lines(report: "LibraryReport", library: Path) -> list[str]:
+def _check_lines(report: dict[str, Any], library: Path) -> list[str]:
     """Returns the lines of a report; the last one is the verdict, with what to do."""
     lines = [
-        f"reaches     {report.reaches} in {report.shards} files",
+        f"reaches     {report['reaches']} in {report['shards']} files",
         f"missing     {_missing(report)}",
-        f"scenarios   {', '.join(report.scenarios) or 'none'}",
-        f"duplicates  {len(report.duplicates)} {' '.join(report.duplicates[:5])}".rstrip(),
-        f"damaged     {len(report.damaged)}",
-        *(f"            {reason}" for reason in report.damaged.values()),
+        f"scenarios   {', '.join(report['scenarios']) or 'none'}",
+        f"duplicates  {len(report['duplicates'])} {' '.join(report['duplicates'][:5])}".rstrip(),
+        f"damaged     {len(report['damaged'])}",
+        *(f"            {reason}" for reason in report["damaged"].values()),
     ]
     go_on = f"lic collect {shlex.quote(str(library))}"
-    if report.damaged and library.is_dir():
+    if report["damaged"] and library.is_dir():
         aside = shlex.quote(str(library / "_damaged"))
-        names = shlex.join(str(library / name) for name in report.damaged)
+        names = shlex.join(str(library / name) for name in report["damaged"])
         lines.append(f"DAMAGED; repair with: mkdir -p {aside} && mv {names} {aside} && {go_on}")
-    elif report.damaged:
+    elif report["damaged"]:
         lines.append("DAMAGED; restore the file, or collect its reaches again")
-    elif len(report.scenarios) > 1:
+    elif len(report["scenarios"]) > 1:
         lines.append("MIXED; keep one library per scenario")
-    elif report.duplicates:
+    elif report["duplicates"]:
         lines.append("DUPLICATES; merge into a new library: lic experience merge --help")
-    elif report.missing:
+    elif report["missing"]:
         lines.append(f"INCOMPLETE; go on with: {go_on}")
     else:
-        lines.append("sound" if report.requested is None else "complete")
+        lines.append("sound" if report["requested"] is None else "complete")
     return lines
 
 
-def _missing(report: "LibraryReport") -> str:
+def _missing(report: dict[str, Any]) -> str:
     """Returns how many reaches are missing, and in which environments."""
-    if report.missing is None:
+    if report["missing"] is None:
         return "unknown, without a request"
-    if report.missing == 0:
-        return f"0 of {report.requested}"
+    if report["missing"] == 0:
+        return f"0 of {report['requested']}"
     # Consecutive indices differ from their rank by the same number.
     runs = [
         [index for _, index in group]
-        for _, group in groupby(enumerate(report.incomplete), lambda pair: pair[1] - pair[0])
+        for _, group in groupby(enumerate(report["incomplete"]), lambda pair: pair[1] - pair[0])
     ]
     spans = [str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs]
-    return f"{report.missing} of {report.requested}, in environments {', '.join(spans)}"
+    return f"{report['missing']} of {report['requested']}, in environments {', '.join(spans)}"
 
 
-def _lines(library: Path, summary: "LibrarySummary") -> list[str]:
+def _lines(library: Path, summary: dict[str, Any]) -> list[str]:
     """Returns the lines of a summary."""
-    low, high = summary.success_interval
-    outcomes = ", ".join(f"{name} {count}" for name, count in summary.outcomes.items())
+    low, high = summary["success_interval"]
+    outcomes = ", ".join(f"{name} {count}" for name, count in summary["outcomes"].items())
     return [
-        f"library       {library} ({summary.shards} shards)",
-        f"scenario      {summary.category}, {summary.robot}, digest {summary.scenario}",
-        f"reaches       {summary.reaches}",
-        f"grid          {summary.environments} environments ({', '.join(summary.streams)}),"
-        f" {summary.goals} goals, {summary.starts} starts",
-        f"success       {summary.successes} of {summary.reaches} = {summary.success_rate:.1%}"
-        f" (90 % interval {low:.1%} to {high:.1%})",
+        f"library       {library} ({summary['shards']} shards)",
+        f"scenario      {summary['category']}, {summary['robot']}, digest {summary['scenario']}",
+        f"reaches       {summary['reaches']}",
+        f"grid          {summary['environments']} environments ({', '.join(summary['streams'])}),"
+        f" {summary['goals']} goals, {summary['starts']} starts",
+        f"success       {summary['successes']} of {summary['reaches']}"
+        f" = {summary['success_rate']:.1%} (90 % interval {low:.1%} to {high:.1%})",
         f"outcomes      {outcomes}",
-        f"time          {summary.simulated_s / 3600.0:.3g} h simulated in"
-        f" {summary.wall_time_s / 3600.0:.3g} h of wall time",
-        f"simulated by  lic_drake {', '.join(summary.lic_drake_versions)};"
-        f" Drake {', '.join(summary.drake_versions)}",
+        f"simulated by  lic_drake {', '.join(summary['lic_drake_versions'])};"
+        f" Drake {', '.join(summary['drake_versions'])}",
         *(
-            f"added         {added.reaches} rows of {added.source}, {added.successes} at the goal,"
-            f" weight {' or '.join(f'{weight:g}' for weight in added.weights)}"
-            for added in summary.added
+            f"added         {added['reaches']} rows of {source}, {added['successes']} at the goal,"
+            f" weight {' or '.join(f'{weight:g}' for weight in added['weights'])}"
+            for source, added in summary["added"].items()
         ),
     ]

@@ -53,7 +53,8 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Runs the subcommand and returns the exit code."""
-    from lic_drake.experience.files import check_writable, write_atomically
+    from lic_drake.errors import check_writable
+    from lic_drake.experience.schema import write_atomically
     from lic_drake.experience.store import ExperienceLibrary
     from lic_drake.paths import shipped_libraries
     from lic_drake.select.registry import check_method
@@ -63,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     check_writable(args.out)
     libraries = [ExperienceLibrary(path) for path in args.library or shipped_libraries()]
     for library in libraries:  # Before the first one is learned from.
-        library.header()
+        library.scenario()
     exhibits = [
         exhibit
         for library in libraries

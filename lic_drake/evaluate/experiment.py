@@ -11,14 +11,13 @@ from uuid import uuid4
 
 import numpy as np
 
-from lic_drake.errors import LibraryError
 from lic_drake.evaluate.trial import run_trial
 from lic_drake.evaluate.trials import TrialRow, read_trials, write_trials
 from lic_drake.experience.pairs import pair_second_attempts
-from lic_drake.experience.runner import Task, add_to_shard, refuse_failed, run_tasks, shard_name
+from lic_drake.experience.runner import Task, refuse_failed, run_tasks, shard_name
 from lic_drake.experience.schema import scenario_text
 from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.experience.workers import ThisProcess, Workers
+from lic_drake.experience.workers import Workers
 from lic_drake.perception.config import CamerasConfig, load_cameras
 from lic_drake.perception.observer import Observer
 from lic_drake.reach.request import ReachRecord, ReachRequest
@@ -131,12 +130,7 @@ def run_evaluation(
     scenario = evaluation.scenario()
     library = evaluation.reaches
     library.create()
-    if library.shard_paths() and library.header().scenario_digest != scenario.digest:
-        raise LibraryError(
-            f"{library.path} holds reaches of a different scenario from"
-            f" {evaluation.scenario_name or evaluation.experience} with"
-            f" {evaluation.overrides or 'no overrides'}; choose another folder for the results"
-        )
+    library.check_scenario(scenario, "the evaluation")
     plan = _Plan(
         name=uuid4().hex,
         evaluation=replace(  # Workers may run in other folders.
@@ -157,7 +151,7 @@ def run_evaluation(
         nonlocal done, simulated
         new_rows, records = result
         if records:
-            add_to_shard(library, task.name, records, scenario)
+            library.add_to_shard(task.name, records, scenario)
         rows.extend(new_rows)
         done += 1
         simulated += len(records)
@@ -182,7 +176,7 @@ def run_evaluation(
             Task(shard_name(evaluation.stream, i), (plan, i, known.pop(i, [])))
             for i in environments
         )
-        failed = run_tasks(tasks, _try_environment, workers or ThisProcess(), finish, report)
+        failed = run_tasks(tasks, _try_environment, workers or Workers(), finish, report)
         refuse_failed(failed)
         library.compact()
     rows.sort(key=lambda row: (row.method, row.environment, row.goal, row.attempt))

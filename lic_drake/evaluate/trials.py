@@ -9,10 +9,9 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 import lic_drake
-from lic_drake.errors import LibraryError, quoted
+from lic_drake.errors import LibraryError, quoted, readable_errors
 from lic_drake.evaluate.statistics import Count
-from lic_drake.experience.files import readable_errors, write_atomically
-from lic_drake.experience.schema import opened, schema_of, write_table
+from lic_drake.experience.schema import opened, schema_of, write_atomically, write_table
 
 VERSION = 1
 """Incremented with every change of the columns."""

@@ -4,9 +4,9 @@ The request is stored beside the shards as a YAML file, so that a collection can
 extended without repeating its options.
 """
 
-import math
+import re
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,15 +16,13 @@ from filelock import FileLock
 from numpy.typing import NDArray
 
 from lic_drake.config import read_mapping
-from lic_drake.errors import LibraryError, RequestError, ScenarioError
-from lic_drake.experience.files import readable_errors, write_atomically
-from lic_drake.experience.runner import Progress, ProgressFunction, ReachFunction, simulate
-from lic_drake.experience.schema import scenario_text
-from lic_drake.experience.store import WHOLE, ExperienceLibrary, Share
+from lic_drake.errors import LibraryError, RequestError, quoted, readable_errors
+from lic_drake.experience.runner import Progress, simulate
+from lic_drake.experience.schema import write_atomically
+from lic_drake.experience.store import ExperienceLibrary, parse_same_scenario
 from lic_drake.experience.workers import Workers
 from lic_drake.reach.request import ReachRequest
-from lic_drake.reach.scenario import Scenario, parse_scenario
-from lic_drake.reach.session import run_reach
+from lic_drake.reach.scenario import Scenario, to_dict
 from lic_drake.reach.start import Starts
 from lic_drake.seeds import STREAMS
 from lic_drake.starts import training_starts
@@ -33,21 +31,12 @@ from lic_drake.types import Vector
 REQUEST_FILE = "_collection.yaml"
 """File name of the request in a library; the underscore hides it from Parquet readers."""
 
-MAX_ENVIRONMENTS = 1_000_000
-"""Larger numbers of environments are rejected as typing errors."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class CollectionRequest:
     """Every goal from every start of a scenario's task, in some environments of a seed stream.
 
-    Attributes:
-        scenario: Defines the grids of goals and starts.
-        stream: Seed stream of the environments.
-        first_environment: Index of the first environment in its stream.
-        environments: Number of environments.
-        max_goals: Subsample the goal grid evenly to at most this many; None: all.
-        max_starts: Subsample the start grid evenly to at most this many; None: all.
+    `max_goals` and `max_starts` thin the grids evenly to at most that many; None: all.
 
     Raises:
         RequestError: A value is out of its range.
@@ -65,12 +54,12 @@ class CollectionRequest:
             raise RequestError(f"unknown stream {self.stream!r}; choose one of {list(STREAMS)}")
         for name, low, high in (
             ("first_environment", 0, 2**31 - 1),
-            ("environments", 1, MAX_ENVIRONMENTS),
-            ("max_goals", 1, math.inf),
-            ("max_starts", 1, math.inf),
+            ("environments", 1, 1_000_000),
+            ("max_goals", 1, 1_000_000),
+            ("max_starts", 1, 1_000_000),
         ):
             value = getattr(self, name)
-            if value is not None and not low <= value <= high:
+            if value is not None and value not in range(low, high + 1):
                 raise RequestError(f"{name} must be from {low} to {high}, got {value}")
 
     @property
@@ -110,14 +99,24 @@ class CollectionRequest:
             for start in starts
         ]
 
-    def all_reaches(self, share: Share = WHOLE) -> Iterator[ReachRequest]:
+    def environments_of(self, share: str) -> range:
+        """Returns the indices of a share "k/n": every n-th environment from the k-th."""
+        match = re.fullmatch(r"(\d+)/(\d+)", share)
+        index, count = map(int, match.groups()) if match else (0, 0)
+        if not 1 <= index <= count:
+            raise RequestError(
+                f"a share is k/n with k from 1 to n, for instance 3/20, got {quoted(share)}"
+            )
+        return self.environment_indices[index - 1 :: count]
+
+    def all_reaches(self, share: str = "1/1") -> Iterator[ReachRequest]:
         """Yields the reaches of a share, environment by environment."""
-        for environment in share.of(self.environment_indices):
+        for environment in self.environments_of(share):
             yield from self.reaches(environment)
 
-    def num_reaches(self, share: Share = WHOLE) -> int:
+    def num_reaches(self, share: str = "1/1") -> int:
         """Returns the number of reaches of a share."""
-        environments = share.of(self.environment_indices)
+        environments = self.environments_of(share)
         if self.scenario.task.stand is None:
             return len(self.goals()) * len(self.starts()) * len(environments)
         return sum(len(self.goals(i)) * len(self.starts(i)) for i in environments)
@@ -128,11 +127,10 @@ def collect(
     request: CollectionRequest,
     workers: Workers | None = None,
     *,
-    share: Share = WHOLE,
-    reach: ReachFunction = run_reach,
-    progress: ProgressFunction = lambda progress: None,
+    share: str = "1/1",
+    **options: Any,
 ) -> Progress:
-    """Simulates the reaches of a request that a library lacks; arguments and errors as `simulate`.
+    """Simulates the reaches of a request that a library lacks; options and errors as `simulate`.
 
     An existing library accepts only its own request, or that with more environments.
     """
@@ -140,87 +138,56 @@ def collect(
     # All shares of a job array may start at the same time.
     with library.locked(share), FileLock(library.path / "_collection.lock"):
         _record_request(library, request)
-    return simulate(
-        request.all_reaches(share),
-        library,
-        workers,
-        total=request.num_reaches(share),
-        share=share,
-        reach=reach,
-        progress=progress,
-    )
+    reaches, total = request.all_reaches(share), request.num_reaches(share)
+    return simulate(reaches, library, workers, total=total, share=share, **options)
 
 
 def _record_request(library: ExperienceLibrary, request: CollectionRequest) -> None:
     """Stores a request in a library unless that belongs to a different one."""
     path = library.path / REQUEST_FILE
     if path.exists():
-        ours, theirs = _values(request), _values(read_request(path))
-        if request.environments > theirs["environments"]:
-            theirs["environments"] = request.environments
-        elif ours == theirs:
+        held = read_request(path)
+        if held == request:
             return
-        if different := [
-            f"{k} {theirs[k]} instead of {ours[k]}" for k in ours if theirs[k] != ours[k]
-        ]:
+        larger = max(held.environments, request.environments)
+        ours, theirs = _values(request), _values(replace(held, environments=larger))
+        differing = [f"{k} {theirs[k]} instead of {ours[k]}" for k in ours if theirs[k] != ours[k]]
+        if differing:
             raise LibraryError(
-                f"{library.path} was begun with {', '.join(different)}; resume with the same"
+                f"{library.path} was begun with {', '.join(differing)}; resume with the same"
                 " options (or none), or use another folder"
             )
-    if library.shard_paths() and library.header().scenario_digest != request.scenario.digest:
-        raise LibraryError(
-            f"{library.path} holds reaches of scenario {library.header().scenario_digest}, not of"
-            f" {request.scenario.digest}; use another folder"
-        )
+    library.check_scenario(request.scenario, "the collection")
     write_request(request, path)
 
 
 def write_request(request: CollectionRequest, path: Path) -> None:
     """Writes a request as YAML, including the whole scenario."""
-    data = {**_values(request), "scenario": yaml.safe_load(scenario_text(request.scenario))}
     content = "# What `lic collect` puts into this folder; seeds and values are complete.\n"
+    data = {**_values(request), "scenario": to_dict(request.scenario)}
     content += yaml.safe_dump(data, sort_keys=False)
     write_atomically(path, lambda temporary: temporary.write_text(content, encoding="utf-8"))
 
 
 def read_request(path: Path) -> CollectionRequest:
-    """Reads a request from YAML.
-
-    Raises:
-        LibraryError: The file cannot be read or is not a request.
-        RequestError: A value is out of range.
-        ScenarioError: This lic_drake does not know the scenario's category or parameters.
-    """
+    """Reads a request from YAML; raises a LicError if it is none or has invalid values."""
     with readable_errors(path, "read"):
-        content = path.read_bytes()
+        data = read_mapping(path.read_bytes(), str(path))
     try:
-        data = read_mapping(content, str(path))
-    except ScenarioError:
-        data = {}
-    types: dict[str, Any] = {item.name: item.type for item in fields(CollectionRequest)}
-    types |= {"scenario": dict, "scenario_digest": str}
-    if set(data) != set(types) or not all(isinstance(data[k], t) for k, t in types.items()):
+        digest, scenario = data.pop("scenario_digest"), yaml.safe_dump(data.pop("scenario"))
+        same = parse_same_scenario(scenario, digest, path)
+        return CollectionRequest(scenario=same, **data)
+    except (KeyError, TypeError) as error:
         raise LibraryError(
-            f"{path} is not a collection request; restore it, or delete it and run lic collect"
-            " with the library's options"
-        )
-    digest = data.pop("scenario_digest")
-    scenario = parse_scenario(yaml.safe_dump(data.pop("scenario")), source=str(path))
-    if scenario.digest != digest:
-        raise LibraryError(
-            f"{path}: its scenario has digest {scenario.digest}, but the library was begun with"
-            f" {digest}: it was edited or another lic_drake wrote it; use another folder"
-        )
-    return CollectionRequest(scenario=scenario, **data)
+            f"{path} is not a collection request ({error}); restore it, or delete it and run lic"
+            " collect with the library's options"
+        ) from None
 
 
 def _values(request: CollectionRequest) -> dict[str, Any]:
     """Returns a request as plain values, the scenario as its digest."""
-    names = [item.name for item in fields(request) if item.name != "scenario"]
-    return {
-        "scenario_digest": request.scenario.digest,
-        **{name: getattr(request, name) for name in names},
-    }
+    values = dict(vars(request))
+    return {"scenario_digest": values.pop("scenario").digest, **values}
 
 
 def _subsample[T: np.generic](grid: NDArray[T], count: int | None) -> NDArray[T]:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lic_drake.errors import LibraryError
+from lic_drake.reach.start import IN_PLANE, IN_SPACE, POSE_AXES
 
 SHOWN = (
     *("start_x", "start_y", "start_phi", "final_x", "final_y", "final_phi", "final_vx", "final_vy"),
@@ -18,13 +19,6 @@ FIRST_PREFIX = "first_"
 """Prefix of these columns for the first reach of a pair."""
 
 _SAME_TASK = ("stream", "environment", "goal_x", "goal_y", "goal_z")
-
-_IN_PLANE = ("start_x", "start_y", "start_phi", "base_x", "base_y")
-_IN_SPACE = (
-    *("start_x", "start_y", "start_z", "start_qw", "start_qx", "start_qy", "start_qz"),
-    *("base_x", "base_y", "torso"),
-)
-"""Columns that each earlier reach in a record's `after` consists of: start pose and base."""
 
 
 def pair_reaches(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
@@ -46,10 +40,11 @@ def pair_reaches(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]
     Raises:
         LibraryError: A column is missing.
     """
-    missing = [name for name in (*_SAME_TASK, *SHOWN, "success") if name not in columns]
-    if missing:
-        raise LibraryError(f"the library has no column {missing[0]!r}, which D2 requires")
-    task = _task_of_each(columns)
+    for name in (*_SAME_TASK, *SHOWN, "success"):
+        if name not in columns:
+            raise LibraryError(f"the library has no column {name!r}, which D2 requires")
+    codes = [np.unique(columns[name], return_inverse=True)[1] for name in _SAME_TASK]
+    task = np.unique(np.column_stack(codes), axis=0, return_inverse=True)[1].ravel()
     members = np.argsort(task, kind="stable")
     num_members = np.bincount(task)
     offset = np.cumsum(num_members) - num_members
@@ -59,33 +54,30 @@ def pair_reaches(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]
     repeats = num_members[task[failed]]
     first = np.repeat(failed, repeats)
     rank = np.arange(len(first)) - np.repeat(np.cumsum(repeats) - repeats, repeats)
-    second = members[offset[task[first]] + rank]
-    return _joined(columns, first, second)
+    return _joined(columns, first, members[offset[task[first]] + rank])
 
 
 def pair_second_attempts(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
     """Returns D2 from actual second attempts: the paper's "straightforward approach".
 
-    Args:
-        columns: Columns of a library of first and second attempts; `after` of the latter has one
-            reach.
-
-    Returns:
-        As `pair_reaches`, in the library's order.
+    Takes the columns of a library of first and second attempts, whose `after` has one reach.
+    Returns them as `pair_reaches`, in the library's order.
 
     Raises:
         LibraryError: There are no second attempts, or the first attempt of one is missing.
     """
-    lengths = np.array([len(after) for after in columns["after"]], dtype=int)
     in_space = np.any(columns.get("start_qw", np.zeros(1)) != 0.0)
-    start = _IN_SPACE if in_space else _IN_PLANE
+    # What each earlier reach in a record's `after` consists of: start pose and base.
+    start = [f"start_{axis}" for axis in POSE_AXES[IN_SPACE if in_space else IN_PLANE]]
+    start += ["base_x", "base_y", *(["torso"] if in_space else [])]
+    lengths = np.array([len(after) for after in columns["after"]], dtype=int)
+    second = np.flatnonzero(lengths == len(start))
+    if len(second) == 0:
+        raise LibraryError("the library holds no second attempts; use one that does")
     first_of = {
         (*(columns[n][i] for n in _SAME_TASK), *(float(columns[n][i]) for n in start)): i
         for i in np.flatnonzero(lengths == 0)
     }
-    second = np.flatnonzero(lengths == len(start))
-    if len(second) == 0:
-        raise LibraryError("the library holds no second attempts; use one that does")
     try:
         first = [
             first_of[(*(columns[n][i] for n in _SAME_TASK), *map(float, columns["after"][i]))]
@@ -103,10 +95,3 @@ def _joined(
 ) -> dict[str, NDArray[Any]]:
     pairs = {name: values[second] for name, values in columns.items()}
     return pairs | {FIRST_PREFIX + name: columns[name][first] for name in SHOWN}
-
-
-def _task_of_each(columns: Mapping[str, NDArray[Any]]) -> NDArray[np.intp]:
-    """Returns an index of each row's environment and goal, shape (n,)."""
-    codes = [np.unique(columns[name], return_inverse=True)[1] for name in _SAME_TASK]
-    _, task = np.unique(np.column_stack(codes), axis=0, return_inverse=True)
-    return task.ravel()

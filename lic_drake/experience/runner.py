@@ -6,20 +6,17 @@ kill loses only the environments in progress. Running the same requests again re
 
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
+from dataclasses import dataclass, field
 from itertools import groupby
-from types import MappingProxyType
 from typing import Any
 
 import lic_drake
 from lic_drake.errors import ClusterError, LibraryError, LicError
-from lic_drake.experience.schema import read_shard, to_records
-from lic_drake.experience.store import WHOLE, ExperienceLibrary, Share
-from lic_drake.experience.workers import ThisProcess, Workers
+from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.experience.workers import Workers
 from lic_drake.reach.request import ReachRecord, ReachRequest
-from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.session import run_reach
 
 ReachFunction = Callable[[ReachRequest], ReachRecord]
@@ -40,17 +37,14 @@ class Task:
     arguments: tuple[Any, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(kw_only=True)
 class Progress:
-    """State of a run.
+    """State of a run, which updates it.
 
     Attributes:
-        total: Number of requested reaches.
-        present: How many of them the library held before this run.
-        done: How many it holds now.
-        successes: How many of those succeeded.
+        total: Number of requested reaches, of which the library held `present` before this run
+            and holds `done` now, among them so many `successes`.
         at_work: Number of environments in progress.
-        elapsed_s: Wall time of this run, seconds.
         failed: Environments that were abandoned, by name, with the reason in one line.
     """
 
@@ -62,25 +56,15 @@ class Progress:
     elapsed_s: float = 0.0
     failed: Mapping[str, str] = field(default_factory=dict)
 
-    @property
-    def reaches_per_minute(self) -> float:
-        """Throughput of this run; 0 before the first shard."""
-        return 60.0 * (self.done - self.present) / self.elapsed_s if self.elapsed_s > 0 else 0.0
-
     def describe(self) -> str:
         """Returns a one-line progress message."""
-        rate, clock = self.reaches_per_minute, "?"
-        if rate > 0:
-            left_min = int((self.total - self.done) / rate)
-            clock = f"{left_min // 60}:{left_min % 60:02d} h"
+        rate = 60.0 * (self.done - self.present) / self.elapsed_s if self.elapsed_s > 0 else 0.0
+        left_min = int((self.total - self.done) / rate) if rate > 0 else None
+        left = "?" if left_min is None else f"{left_min // 60}:{left_min % 60:02d} h"
         return (
             f"{self.done}/{self.total} reaches, {self.successes} successes, {rate:.0f} reaches/min"
-            f" in {self.at_work} environments, {clock} left"
+            f" in {self.at_work} environments, {left} left"
         )
-
-
-ProgressFunction = Callable[[Progress], None]
-"""Called about twice a second during a run and at its end."""
 
 
 def refuse_failed(failed: Mapping[str, str]) -> None:
@@ -98,51 +82,38 @@ def simulate(
     workers: Workers | None = None,
     *,
     total: int | None = None,
-    share: Share = WHOLE,
+    share: str = "1/1",
     reach: ReachFunction = run_reach,
-    progress: ProgressFunction = lambda progress: None,
+    progress: Callable[[Progress], None] = lambda progress: None,
 ) -> Progress:
-    """Simulates the requests that a library lacks.
+    """Simulates the requests that a library lacks, and returns the final state.
 
     Apart from wall times, the result depends neither on the workers nor on interruptions. Finished
     shards are kept whatever is raised.
 
     Args:
-        requests: Requests of one scenario, grouped by environment; may be a generator.
+        requests: Requests of one scenario, grouped by environment.
         library: A folder; created if absent.
         workers: Where to simulate; by default in this process.
-        total: Number of requests, for the progress; by default their length, if they have one.
-        share: Part of a collection that this run covers; see `ExperienceLibrary.locked`.
+        total: Number of requests, if they come from a generator that should stay one.
+        share: The part k/n of a collection that this run covers, see `ExperienceLibrary.locked`.
         reach: Simulates a request.
-        progress: Called during the run.
-
-    Returns:
-        The final state.
+        progress: Called about twice a second.
 
     Raises:
-        LibraryError: The library is in use, contains a damaged file or another scenario, or is not
-            writable.
+        LibraryError: The library is in use, damaged, of another scenario, or not writable.
         ClusterError: The cluster cannot be used.
-        KeyboardInterrupt: On Ctrl-C.
     """
+    if total is None:
+        requests = list(requests)
+        total = len(requests)
     library.create()
-    state = Progress(total=total or (len(requests) if isinstance(requests, Sized) else 0))
+    state = Progress(total=total)
     began_s = time.monotonic()
 
-    def count(successes: Iterable[bool], present: int = 0) -> None:
-        nonlocal state
-        new = list(successes)
-        state = replace(
-            state,
-            total=max(state.total, state.done + len(new)),
-            present=state.present + present,
-            done=state.done + len(new),
-            successes=state.successes + sum(new),
-        )
-
-    def current(at_work: int, failed: Mapping[str, str] = MappingProxyType({})) -> Progress:
-        elapsed_s = time.monotonic() - began_s
-        return replace(state, at_work=at_work, elapsed_s=elapsed_s, failed=failed)
+    def report(at_work: int) -> None:
+        state.at_work, state.elapsed_s = at_work, time.monotonic() - began_s
+        progress(state)
 
     def tasks() -> Iterator[Task]:
         """Yields a task for each incomplete environment."""
@@ -152,7 +123,9 @@ def simulate(
             lacking: list[ReachRequest] = []
             for request in group:
                 if (key := request.key) in held:
-                    count([held[key]], present=1)
+                    state.present += 1
+                    state.done += 1
+                    state.successes += held[key]
                 elif key not in known:
                     lacking.append(request)
                 known.add(key)
@@ -170,18 +143,16 @@ def simulate(
                 f" {', '.join(sorted(versions))}; install lic_drake {lic_drake.__version__} and the"
                 " same extensions on all workers"
             )
-        add_to_shard(library, task.name, records, asked[0].scenario)
-        count(record.success for record in records)
+        library.add_to_shard(task.name, records, asked[0].scenario)
+        state.done += len(records)
+        state.successes += sum(record.success for record in records)
 
     with library.locked(share):
-        failed = run_tasks(
-            tasks(),
-            simulate_environment,
-            workers or ThisProcess(),
-            finish,
-            lambda at_work: progress(current(at_work)),
+        state.failed = run_tasks(
+            tasks(), simulate_environment, workers or Workers(), finish, report
         )
-        return current(0, failed)
+    state.at_work, state.elapsed_s = 0, time.monotonic() - began_s
+    return state
 
 
 def simulate_environment(reach: ReachFunction, requests: list[ReachRequest]) -> list[ReachRecord]:
@@ -194,17 +165,6 @@ def shard_name(stream: str, environment: int) -> str:
     return f"{stream}-{environment:06d}"
 
 
-def add_to_shard(
-    library: ExperienceLibrary, name: str, records: list[ReachRecord], scenario: Scenario
-) -> None:
-    """Adds records to a shard, which is replaced atomically."""
-    path = library.shard_path(name)
-    old = to_records(read_shard(path)[1]) if path.exists() else []
-    keys = {record.key for record in old}
-    new = [record for record in records if record.key not in keys]
-    library.write_shard(name, [*old, *new], scenario)
-
-
 def run_tasks[R](
     tasks: Iterable[Task],
     work: Callable[..., R],
@@ -212,17 +172,12 @@ def run_tasks[R](
     finish: Callable[[Task, R], None],
     report: Callable[[int], None] = lambda at_work: None,
 ) -> dict[str, str]:
-    """Calls `work` with each task's arguments in workers, and `finish` in this process.
+    """Calls `work` with each task's arguments in workers, and `finish` with its result here.
 
-    When a worker process dies, all running calls are repeated, since the executor does not tell
-    which one was responsible; the third run of a task is solitary. Tasks that raise are abandoned.
-
-    Args:
-        tasks: Drawn one by one as workers become free.
-        work: A top-level function.
-        workers: Where to call it.
-        finish: Receives each task and its result.
-        report: Called about twice a second with the number of running calls.
+    Tasks are drawn one by one as workers become free. When a worker process dies, all running
+    calls are repeated, since the executor does not tell which one was responsible; the third run
+    of a task is solitary. Tasks that raise are abandoned. `report` receives the number of running
+    calls about twice a second.
 
     Returns:
         The abandoned tasks by name, with the reason in one line.
@@ -257,6 +212,12 @@ def run_tasks[R](
             return True
         except LicError:
             raise
+        except CancelledError:
+            raise ClusterError("lost the connection to the scheduler") from None
+        except ImportError as error:
+            raise ClusterError(
+                f"a worker failed with: {error}; install the same packages everywhere"
+            ) from error
         except Exception as error:
             failed[task.name] = " ".join(f"{type(error).__name__}: {error}".split())
         return False

@@ -1,13 +1,14 @@
-"""The columns of an experience library, and conversion of records to and from Parquet.
+"""The columns of an experience library, and Parquet files of rows.
 
 The columns are the fields of `ReachRecord`, with unit and description as field metadata. The table
-metadata holds the schema version and the whole scenario, so that every shard is self-contained.
+metadata (the header) holds the schema version, the version of lic_drake, and digest and YAML of
+the scenario, so that every file is self-contained.
 """
 
-import dataclasses
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ import pyarrow.parquet as pq
 import yaml
 
 import lic_drake
-from lic_drake.errors import LibraryError, quoted
+from lic_drake.errors import LibraryError, quoted, readable_errors
 from lic_drake.reach.request import ReachRecord
 from lic_drake.reach.scenario import Scenario, to_dict
 
@@ -30,20 +31,16 @@ _TYPES: dict[Any, pa.DataType] = {
     bool: pa.bool_(),
     tuple[float, ...]: pa.list_(pa.field("element", pa.float64(), nullable=False)),
 }
+_PREFIX = "lic_drake."
+_HEADER = ("schema_version", "lic_drake_version", "scenario_digest", "scenario")
 
 
 def schema_of(row: type[Any]) -> pa.Schema:
     """Returns the columns for a dataclass, with the metadata of its fields."""
+    metadata = {item.name: {k: str(v) for k, v in item.metadata.items()} for item in fields(row)}
     return pa.schema(
-        [
-            pa.field(
-                item.name,
-                _TYPES[item.type],
-                nullable=False,
-                metadata={key: str(value) for key, value in item.metadata.items()},
-            )
-            for item in dataclasses.fields(row)
-        ]
+        pa.field(item.name, _TYPES[item.type], nullable=False, metadata=metadata[item.name])
+        for item in fields(row)
     )
 
 
@@ -51,36 +48,17 @@ SCHEMA = schema_of(ReachRecord)
 """The columns of a library, without the table metadata."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class TableHeader:
-    """Table metadata: versions of the schema and of lic_drake, digest and YAML of the scenario."""
-
-    schema_version: int
-    lic_drake_version: str
-    scenario_digest: str
-    scenario: str
-
-
 def scenario_text(scenario: Scenario) -> str:
     """Returns a scenario as YAML that `parse_scenario` reads back."""
     return yaml.safe_dump(to_dict(scenario), sort_keys=False)
 
 
-def make_header(scenario: Scenario) -> TableHeader:
-    """Returns the metadata that this version of lic_drake writes for a scenario."""
-    return TableHeader(
-        schema_version=SCHEMA_VERSION,
-        lic_drake_version=lic_drake.__version__,
-        scenario_digest=scenario.digest,
-        scenario=scenario_text(scenario),
-    )
-
-
-def to_table(records: Sequence[ReachRecord], header: TableHeader) -> pa.Table:
-    """Returns records as a table, one row each, in order."""
+def to_table(records: Sequence[ReachRecord], scenario: Scenario) -> pa.Table:
+    """Returns records of a scenario as a table, one row each, in order."""
+    values = (str(SCHEMA_VERSION), lic_drake.__version__, scenario.digest, scenario_text(scenario))
+    header = {_PREFIX + name: value for name, value in zip(_HEADER, values, strict=True)}
     columns = {name: [getattr(record, name) for record in records] for name in SCHEMA.names}
-    metadata = {f"lic_drake.{k}": str(v) for k, v in dataclasses.asdict(header).items()}
-    return pa.Table.from_pydict(columns, schema=SCHEMA.with_metadata(metadata))
+    return pa.Table.from_pydict(columns, schema=SCHEMA.with_metadata(header))
 
 
 def to_records(table: pa.Table) -> list[ReachRecord]:
@@ -99,14 +77,38 @@ def write_table(table: pa.Table, path: Path) -> None:
     pq.write_table(table, path, compression="zstd", use_dictionary=texts, write_page_checksum=True)
 
 
+def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
+    """Writes a file so that readers see either the old or the new one, never a part.
+
+    `write` writes the content to the path that it is given. If that fails, a LibraryError is
+    raised and the folder is unchanged.
+    """
+    # The name is fixed so that the next writer overwrites what a killed one left behind. Parquet
+    # readers skip names that begin with a dot or an underscore.
+    temporary = path.with_name(f".{path.name}.tmp")
+    with readable_errors(path, "write"):
+        try:
+            write(temporary)
+            _sync(temporary)
+            os.replace(temporary, path)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+        _sync(path.parent)
+
+
+def _sync(path: Path) -> None:
+    """Flushes a file or directory entry to disk."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
 @contextmanager
 def opened(path: Path, remedy: str) -> Iterator[pq.ParquetFile]:
-    """Opens a Parquet file and turns read errors into a `LibraryError`.
-
-    Args:
-        path: The file.
-        remedy: Advice for the message if it is damaged.
-    """
+    """Opens a Parquet file; errors become a `LibraryError`, with a remedy if it is damaged."""
     try:
         with pq.ParquetFile(path, page_checksum_verification=True) as file:
             yield file
@@ -118,17 +120,16 @@ def opened(path: Path, remedy: str) -> Iterator[pq.ParquetFile]:
         raise LibraryError(f"{path} is damaged or not a Parquet file; {remedy}") from error
 
 
-def read_shard(path: Path, columns: list[str] | None = None) -> tuple[TableHeader, pa.Table]:
-    """Reads the metadata and some columns of a library file, by default all of them.
+def read_shard(path: Path, columns: list[str] | None = None) -> tuple[dict[str, str], pa.Table]:
+    """Reads the header and some columns of a library file, by default all of them.
 
     Raises:
-        LibraryError: The file is missing, damaged, not part of an experience library, or of
-            another schema version.
+        LibraryError: The file is missing, damaged, not part of an experience library, or was
+            written by an incompatible lic_drake.
     """
     columns = SCHEMA.names if columns is None else columns
-    with opened(
-        path, "if it belongs to a library, delete it and collect its reaches again"
-    ) as file:
+    remedy = "if it belongs to a library, delete it and collect its reaches again"
+    with opened(path, remedy) as file:
         header = _check_schema(path, file.schema_arrow)
         table = file.read(columns=columns)
         # Checksums cover pages only: a damaged footer can hide rows.
@@ -139,30 +140,21 @@ def read_shard(path: Path, columns: list[str] | None = None) -> tuple[TableHeade
         return header, table.select(columns)
 
 
-def _check_schema(path: Path, schema: pa.Schema) -> TableHeader:
-    """Returns the header of a schema after checking that this version can read it."""
-    try:
-        metadata = {k.decode(): v.decode() for k, v in (schema.metadata or {}).items()}
-        values = {f.name: metadata[f"lic_drake.{f.name}"] for f in dataclasses.fields(TableHeader)}
-        version = int(values.pop("schema_version"))
-    except (KeyError, ValueError):
+def _check_schema(path: Path, schema: pa.Schema) -> dict[str, str]:
+    """Returns the header of a file after checking that this version can read it."""
+    metadata = schema.metadata or {}
+    header = {name: metadata.get(f"{_PREFIX}{name}".encode(), b"").decode() for name in _HEADER}
+    if not all(header.values()):
         raise LibraryError(
             f"{path} is not part of an experience library (no lic_drake metadata);"
             " move it out of the library's folder"
-        ) from None
-    header = TableHeader(schema_version=version, **values)
-    if version != SCHEMA_VERSION:
-        raise LibraryError(
-            f"{path} has schema version {version}, written by lic_drake"
-            f" {quoted(header.lic_drake_version)}; this lic_drake {lic_drake.__version__} reads"
-            f" version {SCHEMA_VERSION}: use that lic_drake, or collect the library again"
         )
-    if not schema.equals(SCHEMA, check_metadata=False):
-        pairs = zip(SCHEMA, schema, strict=False)
-        differing = set(SCHEMA.names) ^ set(schema.names) or {a.name for a, b in pairs if a != b}
+    version = header["schema_version"]
+    if version != str(SCHEMA_VERSION) or not schema.equals(SCHEMA, check_metadata=False):
         raise LibraryError(
-            f"{path} does not have the columns of this lic_drake"
-            f" ({', '.join(map(quoted, sorted(differing)[:5]))}); delete it and collect its reaches"
-            " again"
+            f"{path} has schema version {quoted(version)}, written by lic_drake"
+            f" {quoted(header['lic_drake_version'])}, or other columns; this lic_drake"
+            f" {lic_drake.__version__} reads version {SCHEMA_VERSION}: use that lic_drake, or"
+            " collect the library again"
         )
     return header

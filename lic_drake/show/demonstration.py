@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from lic_drake.errors import check_writable
 from lic_drake.evaluate.trial import Attempt, run_trial
-from lic_drake.experience.files import check_writable
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.perception.cameras import make_renderer
 from lic_drake.perception.config import CamerasConfig

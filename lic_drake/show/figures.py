@@ -9,9 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from lic_drake.clutter.instance import ClutterInstance
-from lic_drake.errors import LicError
+from lic_drake.errors import LicError, readable_errors
 from lic_drake.evaluate.trial import Attempt
-from lic_drake.experience.files import readable_errors
 from lic_drake.reach.request import is_within_reach
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.start import IN_PLANE, Start

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from pydrake.systems.framework import DiagramBuilder
 
-from lic_drake.experience.files import readable_errors
+from lic_drake.errors import readable_errors
 from lic_drake.perception.cameras import add_cameras, take_color_image
 from lic_drake.perception.config import CamerasConfig
 from lic_drake.show.figures import ShownTrial

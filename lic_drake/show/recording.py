@@ -20,7 +20,7 @@ from pydrake.multibody.meshcat import ContactVisualizer, ContactVisualizerParams
 from pydrake.systems.framework import DiagramBuilder
 
 from lic_drake.clutter.instance import ClutterInstance
-from lic_drake.experience.files import readable_errors
+from lic_drake.errors import readable_errors
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.show.approach import Approach

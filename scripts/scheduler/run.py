@@ -16,8 +16,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from lic_drake.experience.collect import CollectionRequest, collect
-from lic_drake.experience.dask_workers import DaskWorkers
 from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.experience.workers import DaskWorkers
 from lic_drake.paths import shipped_library
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from scripts.common import make_parser, run_script, write_report

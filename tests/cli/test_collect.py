@@ -133,7 +133,7 @@ def test_a_scheduler_that_is_not_there_is_one_line(
     collect: Collect, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pytest.importorskip("distributed", reason="Dask is missing: pip install 'lic_drake[cluster]'")
-    monkeypatch.setattr("lic_drake.experience.dask_workers.CONNECT_S", 0.5)
+    monkeypatch.setattr("lic_drake.experience.workers.CONNECT_S", 0.5)
     with socket.create_server(("127.0.0.1", 0)) as silent:
         address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
         for wrong, reason in ((address, ""), ("node1", "missing port number")):

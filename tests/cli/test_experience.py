@@ -151,7 +151,7 @@ def test_a_wrong_row_is_one_line_on_stderr_and_nothing_is_written(
     assert main(["experience", "add", str(library), str(path), "--source", "lab"]) == 2
     error = capsys.readouterr().err
     assert error == (
-        "lic: error: wrong.csv, row 2: start_phi is 60, but must be from -3.1416 to 3.1416 rad, not"
-        " degrees; correct it or leave the row out\n"
+        "lic: error: row 2: start_phi is 60, but must be a number from -3.1416 to 3.1416 rad;"
+        " correct it or leave the row out\n"
     )
     assert len(list(library.glob("*.parquet"))) == 3

@@ -11,9 +11,8 @@ from lic_drake.errors import LibraryError, RequestError
 from lic_drake.evaluate import experiment as dut
 from lic_drake.evaluate.experiment import Evaluation, run_evaluation
 from lic_drake.evaluate.trials import TrialRow, read_trials
-from lic_drake.experience.dask_workers import DaskWorkers
 from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.experience.workers import LocalWorkers
+from lic_drake.experience.workers import DaskWorkers, LocalWorkers
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.scenario import load_scenario
 

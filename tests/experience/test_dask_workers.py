@@ -16,9 +16,9 @@ from support.fake_reach import FakeReach, comparable, expected_records, make_req
 
 from lic_drake.errors import ClusterError
 from lic_drake.experience.collect import collect
-from lic_drake.experience.dask_workers import DaskWorkers
 from lic_drake.experience.runner import Progress, ReachFunction
 from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.experience.workers import DaskWorkers
 
 REQUEST = make_request()
 REACHES = REQUEST.reaches(0)
@@ -61,7 +61,8 @@ def test_an_environment_that_aborts_the_interpreter_is_abandoned(
 ) -> None:
     deadly = replace(reach, deadly=REACHES[7].key, deaths=99, death=signal.SIGABRT)
     report = run(dask, library, deadly)
-    assert report.failed == {"training-000000": "RuntimeError: its worker processes died"}
+    assert list(report.failed) == ["training-000000"]
+    assert "all those workers died while running it" in report.failed["training-000000"]
     assert {record.environment for record in library.records()} == {1, 2}
     assert run(dask, library, reach).failed == {}
     assert comparable(library.records()) == expected_records(REQUEST)
@@ -120,6 +121,6 @@ def test_workers_that_join_later_are_used_and_a_lost_scheduler_loses_no_shard(
         assert process.returncode == 2
         waiting, lost = error.splitlines()
         assert "no workers yet, waiting for some; start them with: dask worker tcp" in waiting
-        assert f"lost the connection to the scheduler at {dask.address}; finished" in lost
+        assert "lost the connection to the scheduler" in lost and "; finished env" in lost
     assert 12 <= collect(library, REQUEST, reach=reach).present < 36
     assert comparable(library.records()) == expected_records(REQUEST)

@@ -9,7 +9,7 @@ from support.fake_reach import make_record, make_request
 
 from lic_drake.errors import LibraryError
 from lic_drake.experience.pairs import SHOWN, pair_reaches, pair_second_attempts
-from lic_drake.experience.schema import make_header, to_table
+from lic_drake.experience.schema import to_table
 from lic_drake.reach.request import ReachRequest
 from lic_drake.reach.start import Start
 
@@ -54,17 +54,11 @@ def test_the_pairs_are_those_of_two_loops(num_reaches: int, seed: int) -> None:
 def test_the_papers_library_is_paired_in_less_than_a_second() -> None:
     """20 environments x 45 goals x 21 starts, 8.2 failures of each 21."""
     rng = np.random.default_rng(0)
-    num_reaches = 20 * 45 * 21
-    columns = {name: rng.normal(size=num_reaches) for name in SHOWN}
-    task = np.arange(num_reaches) // 21
-    columns |= {
-        "environment": task // 45,
-        "goal_x": task % 5 * 0.1,
-        "goal_y": task % 9 * 0.1,
-        "goal_z": np.zeros(num_reaches),
-        "stream": np.full(num_reaches, "training", dtype=object),
-        "success": rng.random(num_reaches) < 0.61,
-    }
+    columns = _library(20 * 45 * 21, rng)
+    task = np.arange(20 * 45 * 21) // 21
+    columns |= {"environment": task // 45, "goal_x": task % 5 * 0.1, "goal_y": task % 9 * 0.1}
+    columns |= {"stream": np.full(len(task), "training", dtype=object)}
+    columns |= {"final_x": rng.normal(size=len(task)), "success": rng.random(len(task)) < 0.61}
     began = time.perf_counter()
     pairs = pair_reaches(columns)
     assert time.perf_counter() - began < 1.0
@@ -79,7 +73,7 @@ def test_a_missing_column_is_named() -> None:
 
 
 def _attempts(requests: list[ReachRequest]) -> dict[str, np.ndarray[Any, Any]]:
-    table = to_table([make_record(r) for r in requests], make_header(requests[0].scenario))
+    table = to_table([make_record(r) for r in requests], requests[0].scenario)
     return {name: table.column(name).to_numpy() for name in table.column_names}
 
 

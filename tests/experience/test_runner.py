@@ -11,8 +11,8 @@ from support.fake_reach import FakeReach, comparable, expected_records, make_rec
 
 from lic_drake.errors import ClusterError, LibraryError
 from lic_drake.experience.collect import REQUEST_FILE, collect, read_request
-from lic_drake.experience.runner import Progress, simulate
-from lic_drake.experience.store import ExperienceLibrary, Share, merge_libraries
+from lic_drake.experience.runner import simulate
+from lic_drake.experience.store import ExperienceLibrary, merge_libraries
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.scenario import load_scenario
 
@@ -27,15 +27,17 @@ def names(library: ExperienceLibrary) -> list[str]:
 def test_a_collection_fills_the_library_and_a_second_run_simulates_nothing(
     library: ExperienceLibrary, reach: FakeReach
 ) -> None:
-    seen: list[Progress] = []
-    report = collect(library, REQUEST, reach=reach, progress=seen.append)
+    seen: list[tuple[int, str]] = []
+    report = collect(
+        library, REQUEST, reach=reach, progress=lambda p: seen.append((p.done, p.describe()))
+    )
     assert comparable(library.records()) == expected_records(REQUEST)
     assert names(library) == [REQUEST_FILE, *SHARDS]
     assert read_request(library.path / REQUEST_FILE) == REQUEST
     assert (report.failed, report.present, report.done) == ({}, 0, 36)
     assert report.successes == sum(record.success for record in library.records())
-    assert [progress.done for progress in seen] == [12, 24, 36]
-    assert seen[-1].describe().endswith("0:00 h left")
+    assert [done for done, _ in seen] == [12, 24, 36]
+    assert seen[-1][1].endswith("0:00 h left")
 
     again = collect(library, REQUEST, reach=reach)
     assert len(reach.calls()) == 36
@@ -76,10 +78,10 @@ def test_shares_divide_the_environments_and_any_collection_completes_them(
     library: ExperienceLibrary, reach: FakeReach
 ) -> None:
     larger = replace(REQUEST, environments=5)
-    report = collect(library, larger, share=Share(2, 3), reach=reach)
+    report = collect(library, larger, share="2/3", reach=reach)
     assert (report.total, report.done) == (24, 24)
     assert names(library) == [REQUEST_FILE, "training-000001.parquet", "training-000004.parquet"]
-    assert collect(library, larger, share=Share(7, 7), reach=reach).total == 0
+    assert collect(library, larger, share="7/7", reach=reach).total == 0
     rest = collect(library, larger, reach=reach)
     assert (rest.total, rest.present) == (60, 24)
     assert comparable(library.records()) == expected_records(larger)

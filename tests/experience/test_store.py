@@ -7,13 +7,14 @@ import pandas as pd
 import pytest
 from support.fake_reach import comparable, make_record, make_request
 
-from lic_drake.errors import LibraryError, RequestError
+from lic_drake.errors import LibraryError
 from lic_drake.experience.collect import REQUEST_FILE, write_request
-from lic_drake.experience.store import COMPACTED, ExperienceLibrary, Share, merge_libraries
+from lic_drake.experience.store import COMPACTED, ExperienceLibrary, merge_libraries
 from lic_drake.reach.scenario import load_scenario
 
 REQUEST = make_request()
 SCENARIO = REQUEST.scenario
+OTHER = load_scenario("cylinder-clutter", "{stop: {timeout_s: 20}}")
 RECORDS = [[make_record(item) for item in REQUEST.reaches(e)] for e in range(3)]
 
 
@@ -89,25 +90,17 @@ def test_missing_and_empty_libraries_are_reported(tmp_path: Path) -> None:
     with pytest.raises(LibraryError, match=r"no experience library at .*; make one with: lic"):
         ExperienceLibrary(tmp_path / "none").successes()
     empty = ExperienceLibrary(tmp_path)
-    assert (empty.successes(), empty.num_reaches) == ({}, 0)
+    assert empty.successes() == {}
     with pytest.raises(LibraryError, match="holds no reaches yet"):
         empty.columns()
 
 
 def test_shards_of_different_scenarios_do_not_mix(library: ExperienceLibrary) -> None:
-    other = load_scenario("cylinder-clutter", "{stop: {timeout_s: 20}}")
-    with pytest.raises(LibraryError, match=f"do not belong to scenario {other.digest}"):
-        library.write_shard("other", RECORDS[2], other)
-    rows = [replace(record, scenario=other.digest) for record in RECORDS[2]]
-    library.write_shard("other", rows, other)
+    with pytest.raises(LibraryError, match=f"do not belong to scenario {OTHER.digest}"):
+        library.write_shard("other", RECORDS[2], OTHER)
+    library.write_shard("other", [replace(r, scenario=OTHER.digest) for r in RECORDS[2]], OTHER)
     with pytest.raises(LibraryError, match="hold different scenarios"):
         library.records()
-
-
-def test_shards_are_plain_files_in_the_folder(library: ExperienceLibrary) -> None:
-    for name in ("../escape", "a/b", "_hidden", ".hidden", ""):
-        with pytest.raises(LibraryError, match="cannot be a shard's name"):
-            library.write_shard(name, RECORDS[0], SCENARIO)
 
 
 def test_a_folder_without_write_permission_is_one_clear_error(
@@ -139,10 +132,9 @@ def test_merging_keeps_every_reach_once_in_order(
     merged = ExperienceLibrary(output)
     assert comparable(merged.records()) == comparable(RECORDS[0] + RECORDS[1] + RECORDS[2])
     assert merged.scenario() == SCENARIO
-    with pytest.raises(LibraryError, match=r"all\.parquet exists; delete it or choose another"):
-        merge_libraries([other], output)
-    with pytest.raises(LibraryError, match=r"needs the suffix \.parquet"):
-        merge_libraries([other], tmp_path / "all")
+    for wrong in (output, tmp_path / "all"):
+        with pytest.raises(LibraryError, match=r"exists, or does not end in \.parquet; delete it"):
+            merge_libraries([other], wrong)
 
 
 def test_contradictions_and_different_scenarios_are_not_merged(
@@ -152,10 +144,9 @@ def test_contradictions_and_different_scenarios_are_not_merged(
     other.write_shard("a", [replace(RECORDS[1][4], duration_s=1.0)], SCENARIO)
     with pytest.raises(LibraryError, match=f"another result of reach {RECORDS[1][4].key}"):
         merge_libraries([library, other], tmp_path / "all.parquet")
-    scenario = load_scenario("cylinder-clutter", "{stop: {timeout_s: 20}}")
     strange = ExperienceLibrary(tmp_path / "strange")
-    strange.write_shard("a", [replace(RECORDS[0][0], scenario=scenario.digest)], scenario)
-    with pytest.raises(LibraryError, match=f"strange holds scenario {scenario.digest}, but"):
+    strange.write_shard("a", [replace(RECORDS[0][0], scenario=OTHER.digest)], OTHER)
+    with pytest.raises(LibraryError, match=f"strange holds reaches of scenario {OTHER.digest}"):
         merge_libraries([library, strange], tmp_path / "all.parquet")
     assert not (tmp_path / "all.parquet").exists()
 
@@ -163,18 +154,10 @@ def test_contradictions_and_different_scenarios_are_not_merged(
 def test_only_shares_of_the_same_collection_may_hold_locks_concurrently(
     library: ExperienceLibrary,
 ) -> None:
-    with library.locked(Share(1, 2)), library.locked(Share(2, 2)):
-        for share in (Share(1, 2), Share(), Share(1, 3)):
+    with library.locked("1/2"), library.locked("2/2"):
+        for share in ("1/2", "1/1", "1/3"):
             with pytest.raises(LibraryError, match="another process is adding to"):
                 with library.locked(share):
                     pass
     with library.locked():
         pass
-
-
-def test_a_share_is_every_nth_environment() -> None:
-    assert [list(Share(k, 3).of(range(5, 12))) for k in (1, 2, 3)] == [[5, 8, 11], [6, 9], [7, 10]]
-    assert Share.parse("2/3") == Share(2, 3)
-    for text in ("0/3", "4/3", "1", "a/b", "-1/3"):
-        with pytest.raises(RequestError, match="a share is k/n with k from 1 to n"):
-            Share.parse(text)

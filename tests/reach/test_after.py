@@ -11,7 +11,7 @@ import pytest
 from support.fake_reach import comparable
 from support.reaches import assert_never_began, reach_request, small_clutter
 
-from lic_drake.experience.schema import make_header, read_shard, to_records, to_table, write_table
+from lic_drake.experience.schema import read_shard, to_records, to_table, write_table
 from lic_drake.reach import session as dut
 from lic_drake.reach.environment import Environment
 from lic_drake.reach.record import make_record
@@ -148,6 +148,6 @@ def test_a_record_leads_back_to_its_request(request_: ReachRequest, tmp_path: Pa
     assert ReachRequest.from_record(record, shorter.scenario).key == record.key
     # Also from a file.
     path = tmp_path / "reaches.parquet"
-    write_table(to_table([record], make_header(shorter.scenario)), path)
+    write_table(to_table([record], shorter.scenario), path)
     (row,) = to_records(read_shard(path)[1])
     assert ReachRequest.from_record(row, shorter.scenario) == shorter

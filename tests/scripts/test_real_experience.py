@@ -1,4 +1,3 @@
-from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from lic_drake.evaluate.statistics import Count, count
 from lic_drake.evaluate.trial import random_requests
 from lic_drake.evaluate.trials import TrialTable, read_trials
 from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.experience.workers import ThisProcess
+from lic_drake.experience.workers import Workers
 from lic_drake.paths import shipped_library
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from scripts.real_experience import run as script
@@ -34,7 +33,7 @@ def test_records_of_weight_turn_a_selection_that_the_simulation_had_wrong(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(experiment, "run_reach", reach)
-    monkeypatch.setattr(script, "LocalWorkers", lambda _: nullcontext(ThisProcess()))
+    monkeypatch.setattr(script, "LocalWorkers", lambda _: Workers())
     shipped = ExperienceLibrary(shipped_library("passage-clutter"))
     few = ExperienceLibrary(tmp_path / "simulated")
     few.write_shard("few", shipped.records()[:280], shipped.scenario())
