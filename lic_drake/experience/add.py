@@ -22,10 +22,6 @@ from lic_drake.experience.store import SUFFIX, ExperienceLibrary
 from lic_drake.reach.request import SIMULATION, ReachRecord, check_goal
 from lic_drake.reach.scenario import Scenario
 
-START_TOLERANCE_M = 0.02
-"""Allowed distance of a start from the start line, metres: calibration error and a hand-taught
-start. LIC-1's features assume the line."""
-
 _LIMITS = {
     **{"success": (0.0, 1.0), "environment": (0.0, 1e6)},
     **{"start_phi": (-3.1416, 3.1416), "final_phi": (-3.1416, 3.1416)},
@@ -62,16 +58,13 @@ def add_rows(
     source: str,
     weight: float = 1.0,
 ) -> list[ReachRecord]:
-    """Validates rows and adds them to a library; either all are written or none.
+    """Validates rows and adds them to a library, all or none; returns them as stored.
 
     Args:
         library: A folder with reaches, whose scenario the rows belong to.
         rows: Each with the columns of `columns_of`; None and empty text mean "not observed".
         source: Who made them: letters, digits, dots, dashes and underscores.
         weight: Number of simulated reaches that each row counts as.
-
-    Returns:
-        The rows as stored in the library.
     """
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,100}", source) or source == SIMULATION:
         raise LibraryError(f"{quoted(source)} cannot be the name of a source; use one like lab-arm")
@@ -105,10 +98,7 @@ def add_rows(
 
 
 def columns_of(scenario: Scenario) -> dict[str, float | None]:
-    """Returns the columns that rows may have, named as in a library, each with its default.
-
-    None marks a required column, NaN one that may be unobserved.
-    """
+    """Returns the columns that rows may have, with defaults; None: required, NaN: unobserved."""
     columns: dict[str, float | None] = dict.fromkeys(("success", "goal_x", "goal_y", "start_y"))
     columns |= {"base_x": 0.0, "environment": math.nan}
     columns |= dict.fromkeys(("final_x", "final_y", "final_vx", "final_vy"), math.nan)
@@ -124,10 +114,8 @@ def columns_of(scenario: Scenario) -> dict[str, float | None]:
 def check_rows(rows: Iterable[Mapping[str, object]], scenario: Scenario) -> list[dict[str, Any]]:
     """Returns rows as values of the fields of `ReachRecord` that a robot can observe.
 
-    Each row without an environment is given one of its own.
-
-    Raises:
-        LibraryError: There are no rows, a column is missing or unknown, or a value is invalid.
+    Each row without an environment is given one of its own. Raises a LibraryError that names the
+    wrong column, or row and value.
     """
     listed, columns = list(rows), columns_of(scenario)
     if not listed:
@@ -188,15 +176,14 @@ def _check_place(row: Mapping[str, float], scenario: Scenario) -> None:
     """Rejects a goal out of reach, and a start off the start line or without a rotation."""
     b0 = np.array([row["base_x"], row["base_y"], row.get("torso", 0.0)])
     check_goal(scenario, [row["goal_x"], row["goal_y"], row.get("goal_z", 0.0)] - b0)
+    line, off = scenario.task.start_line, 0.02  # Calibration error and a hand-taught start, m.
+    limits = [
+        ("start_x - base_x", row["start_x"] - b0[0], line.x_m - off, line.x_m + off),
+        ("start_y - base_y", row["start_y"] - b0[1], line.y_min_m - off, line.y_max_m + off),
+    ]
     if "torso" in row:
         length = math.hypot(*(row[f"start_q{axis}"] for axis in "wxyz"))
         limits = [("the length of the quaternion start_qw to start_qz", length, 0.999, 1.001)]
-    else:
-        line, off = scenario.task.start_line, START_TOLERANCE_M
-        limits = [
-            ("start_x - base_x", row["start_x"] - b0[0], line.x_m - off, line.x_m + off),
-            ("start_y - base_y", row["start_y"] - b0[1], line.y_min_m - off, line.y_max_m + off),
-        ]
     for name, value, low, high in limits:
         if not low <= value <= high:
             raise LibraryError(f"{name} is {value:g}, but must be from {low:g} to {high:g}")

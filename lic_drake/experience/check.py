@@ -25,8 +25,6 @@ def check_library(
 ) -> dict[str, Any]:
     """Reads every file of a library in full and reports all faults, ready for JSON.
 
-    The request, if any, is its intended contents.
-
     Returns:
         `shards`, `reaches`: number of Parquet files, and of rows in the readable ones.
         `damaged`: reasons by name of unreadable files; `scenarios`: digests, more than one is an

@@ -36,10 +36,8 @@ REQUEST_FILE = "_collection.yaml"
 class CollectionRequest:
     """Every goal from every start of a scenario's task, in some environments of a seed stream.
 
-    `max_goals` and `max_starts` thin the grids evenly to at most that many; None: all.
-
-    Raises:
-        RequestError: A value is out of its range.
+    `max_goals` and `max_starts` thin the grids evenly to at most that many; None: all. Values out
+    of range raise a RequestError.
     """
 
     scenario: Scenario
@@ -68,19 +66,12 @@ class CollectionRequest:
         return range(self.first_environment, self.first_environment + self.environments)
 
     def goals(self, environment: int | None = None) -> Vector:
-        """Returns the goals p_WG in an environment (by default the first), shape (n, 3), metres.
-
-        n is the same in all environments.
-        """
+        """Returns the goals p_WG in an environment (by default the first), shape (n, 3), metres."""
         index = self.first_environment if environment is None else environment
         return _subsample(self.scenario.goals(self.stream, index), self.max_goals)
 
     def starts(self, environment: int | None = None) -> Starts:
-        """Returns the initial conditions in an environment, by default the first.
-
-        Raises:
-            RequestError: No start pose is reachable.
-        """
+        """Returns the initial conditions in an environment, by default the first."""
         index = self.first_environment if environment is None else environment
         starts = training_starts(self.scenario, self.stream, index)
         if len(starts) == 0:

@@ -36,9 +36,6 @@ def pair_reaches(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]
     Returns:
         The columns of the second reach, and those of `SHOWN` of the first, with `FIRST_PREFIX`.
         Pairs are grouped by first reach, in the order of D1.
-
-    Raises:
-        LibraryError: A column is missing.
     """
     for name in (*_SAME_TASK, *SHOWN, "success"):
         if name not in columns:
@@ -62,9 +59,6 @@ def pair_second_attempts(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArr
 
     Takes the columns of a library of first and second attempts, whose `after` has one reach.
     Returns them as `pair_reaches`, in the library's order.
-
-    Raises:
-        LibraryError: There are no second attempts, or the first attempt of one is missing.
     """
     in_space = np.any(columns.get("start_qw", np.zeros(1)) != 0.0)
     # What each earlier reach in a record's `after` consists of: start pose and base.

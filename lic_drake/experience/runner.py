@@ -59,8 +59,8 @@ class Progress:
     def describe(self) -> str:
         """Returns a one-line progress message."""
         rate = 60.0 * (self.done - self.present) / self.elapsed_s if self.elapsed_s > 0 else 0.0
-        left_min = int((self.total - self.done) / rate) if rate > 0 else None
-        left = "?" if left_min is None else f"{left_min // 60}:{left_min % 60:02d} h"
+        left_min = int((self.total - self.done) / rate) if rate > 0 else 0
+        left = f"{left_min // 60}:{left_min % 60:02d} h" if rate > 0 else "?"
         return (
             f"{self.done}/{self.total} reaches, {self.successes} successes, {rate:.0f} reaches/min"
             f" in {self.at_work} environments, {left} left"
@@ -81,7 +81,7 @@ def simulate(
     library: ExperienceLibrary,
     workers: Workers | None = None,
     *,
-    total: int | None = None,
+    total: int = 0,
     share: str = "1/1",
     reach: ReachFunction = run_reach,
     progress: Callable[[Progress], None] = lambda progress: None,
@@ -95,7 +95,7 @@ def simulate(
         requests: Requests of one scenario, grouped by environment.
         library: A folder; created if absent.
         workers: Where to simulate; by default in this process.
-        total: Number of requests, if they come from a generator that should stay one.
+        total: Number of requests, for the progress.
         share: The part k/n of a collection that this run covers, see `ExperienceLibrary.locked`.
         reach: Simulates a request.
         progress: Called about twice a second.
@@ -104,9 +104,6 @@ def simulate(
         LibraryError: The library is in use, damaged, of another scenario, or not writable.
         ClusterError: The cluster cannot be used.
     """
-    if total is None:
-        requests = list(requests)
-        total = len(requests)
     library.create()
     state = Progress(total=total)
     began_s = time.monotonic()
@@ -118,30 +115,23 @@ def simulate(
     def tasks() -> Iterator[Task]:
         """Yields a task for each incomplete environment."""
         held = library.successes()
-        known = set(held)
         for environment, group in groupby(requests, lambda r: (r.stream, r.environment)):
-            lacking: list[ReachRequest] = []
-            for request in group:
-                if (key := request.key) in held:
-                    state.present += 1
-                    state.done += 1
-                    state.successes += held[key]
-                elif key not in known:
-                    lacking.append(request)
-                known.add(key)
-            if lacking:
+            asked = {request.key: request for request in group}
+            present = [held[key] for key in asked if key in held]
+            state.present += len(present)
+            state.done += len(present)
+            state.successes += sum(present)
+            if lacking := [request for key, request in asked.items() if key not in held]:
                 yield Task(shard_name(*environment), (reach, lacking))
 
     def finish(task: Task, records: list[ReachRecord]) -> None:
         """Writes the shard of a task."""
         asked: list[ReachRequest] = task.arguments[1]
-        versions = {record.lic_drake_version for record in records}
-        same_keys = [record.key for record in records] == [request.key for request in asked]
-        if not same_keys or versions != {lic_drake.__version__}:
+        made = [(record.key, record.lic_drake_version) for record in records]
+        if made != [(request.key, lic_drake.__version__) for request in asked]:
             raise ClusterError(
-                f"a worker simulated different reaches from those of {task.name}, with lic_drake"
-                f" {', '.join(sorted(versions))}; install lic_drake {lic_drake.__version__} and the"
-                " same extensions on all workers"
+                f"a worker simulated different reaches from those of {task.name}, or has another"
+                f" lic_drake; install {lic_drake.__version__} and the same extensions everywhere"
             )
         library.add_to_shard(task.name, records, asked[0].scenario)
         state.done += len(records)
@@ -215,9 +205,8 @@ def run_tasks[R](
         except CancelledError:
             raise ClusterError("lost the connection to the scheduler") from None
         except ImportError as error:
-            raise ClusterError(
-                f"a worker failed with: {error}; install the same packages everywhere"
-            ) from error
+            message = f"a worker failed with: {error}; install the same packages everywhere"
+            raise ClusterError(message) from error
         except Exception as error:
             failed[task.name] = " ".join(f"{type(error).__name__}: {error}".split())
         return False

@@ -121,12 +121,7 @@ def opened(path: Path, remedy: str) -> Iterator[pq.ParquetFile]:
 
 
 def read_shard(path: Path, columns: list[str] | None = None) -> tuple[dict[str, str], pa.Table]:
-    """Reads the header and some columns of a library file, by default all of them.
-
-    Raises:
-        LibraryError: The file is missing, damaged, not part of an experience library, or was
-            written by an incompatible lic_drake.
-    """
+    """Reads the header and some columns of a library file, by default all of them."""
     columns = SCHEMA.names if columns is None else columns
     remedy = "if it belongs to a library, delete it and collect its reaches again"
     with opened(path, remedy) as file:

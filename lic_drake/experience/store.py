@@ -24,12 +24,6 @@ from lic_drake.reach.scenario import Scenario, parse_scenario
 SUFFIX = ".parquet"
 """Suffix of shards."""
 
-COMPACTED = "reaches"
-"""Name of the shard that `ExperienceLibrary.compact` writes."""
-
-PATIENCE_S = 1.0
-"""Another process may hold a lock briefly, just to test it; wait this long, seconds."""
-
 
 class ExperienceLibrary:
     """Reaches of one scenario: a folder of shards, or a single Parquet file.
@@ -88,11 +82,7 @@ class ExperienceLibrary:
         return found
 
     def scenario(self) -> Scenario:
-        """Returns the scenario of the reaches.
-
-        Raises:
-            ScenarioError: This lic_drake does not know the scenario's category or parameters.
-        """
+        """Returns the scenario of the reaches; raises a ScenarioError if it is unknown here."""
         header = self._read([])[0]
         return parse_same_scenario(header["scenario"], header["scenario_digest"], self.path)
 
@@ -126,12 +116,7 @@ class ExperienceLibrary:
         return self.path / f"{name}{SUFFIX}"
 
     def write_shard(self, name: str, records: Sequence[ReachRecord], scenario: Scenario) -> Path:
-        """Writes records of a scenario to a new or replaced shard, atomically; returns its path.
-
-        Raises:
-            LibraryError: The folder cannot be written (permission, disk full), or a record belongs
-                to another scenario.
-        """
+        """Writes records of a scenario to a new or replaced shard, atomically; returns its path."""
         for other in {record.scenario for record in records} - {scenario.digest}:
             raise LibraryError(
                 f"shard {name}: records of scenario {other} do not belong to"
@@ -150,13 +135,13 @@ class ExperienceLibrary:
         self.write_shard(name, [*held, *(r for r in records if r.key not in keys)], scenario)
 
     def compact(self) -> None:
-        """Merges all shards of a folder into one; loses nothing if killed."""
+        """Merges all shards of a folder into one, `reaches`; loses nothing if killed."""
         paths = self.shard_paths()
         if len(paths) < 2:
             return
         records = {record.key: record for record in self.records()}
         rows = sorted(records.values(), key=lambda r: (r.stream, r.environment, r.key))
-        whole = self.write_shard(COMPACTED, rows, self.scenario())
+        whole = self.write_shard("reaches", rows, self.scenario())
         with readable_errors(self.path, "delete the old shards of"):
             for path in paths:
                 if path != whole:
@@ -167,9 +152,6 @@ class ExperienceLibrary:
         """Locks the library against writers other than those of other shares k/n with the same n.
 
         The operating system releases the lock when the process ends, even if it is killed.
-
-        Raises:
-            LibraryError: Another process is adding to it, or the folder cannot be written.
         """
         index, _, count = share.partition("/")
         path = self.path / f"_collecting-{index}-of-{count}.lock"
@@ -180,7 +162,8 @@ class ExperienceLibrary:
             try:
                 lock.acquire()
                 for other in others:
-                    with FileLock(other, timeout=PATIENCE_S):
+                    # Another process may hold it briefly, just to test it.
+                    with FileLock(other, timeout=1.0):
                         pass
             except Timeout as error:
                 lock.release()
@@ -213,11 +196,7 @@ def parse_same_scenario(text: str, digest: str, path: Path) -> Scenario:
 def merge_libraries(sources: Sequence[ExperienceLibrary], output: Path) -> int:
     """Merges libraries of one scenario into a new .parquet file; returns its number of rows.
 
-    Identical rows are written once. Rows are sorted by environment, stably.
-
-    Raises:
-        LibraryError: The file exists, the scenarios differ, two libraries hold different results
-            of a reach, or a file cannot be read or written.
+    Equal rows are written once, different ones of a reach refused; sorted by environment, stably.
     """
     if output.suffix != SUFFIX or output.exists():
         raise LibraryError(

@@ -33,18 +33,15 @@ class Workers:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        pass
+    def __exit__(self, *exception: object) -> None:
+        """Ends the workers."""
 
     def capacity(self) -> int:
         """Returns the number of tasks that can run concurrently now."""
         return 1
 
     def submit[T](self, work: Callable[..., T], /, *args: Any) -> Future[T]:
-        """Calls a top-level function.
-
-        The future raises BrokenExecutor if any worker process died.
-        """
+        """Calls a top-level function; the future raises BrokenExecutor if any worker died."""
         future: Future[T] = Future()
         try:
             future.set_result(work(*args))
@@ -59,9 +56,8 @@ class Workers:
 class LocalWorkers(Workers):
     """Worker processes on this machine.
 
-    Leaving the context with an exception (Ctrl-C, full disk) terminates the workers immediately;
-    they also end with this process, even if it is killed. Scripts need the usual
-    `if __name__ == "__main__":`.
+    Leaving the context terminates them immediately; they also end with this process, even if it is
+    killed. Scripts need the usual `if __name__ == "__main__":`.
     """
 
     def __init__(self, count: int | None = None) -> None:
@@ -69,11 +65,9 @@ class LocalWorkers(Workers):
         self._count = count or os.cpu_count() or 1
         self._start()
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is not None:
-            self._parent.close()
-        self._executor.shutdown(cancel_futures=True)
+    def __exit__(self, *exception: object) -> None:
         self._parent.close()
+        self._executor.shutdown(cancel_futures=True)
 
     def capacity(self) -> int:
         """Returns the number of processes."""
@@ -91,8 +85,7 @@ class LocalWorkers(Workers):
 
     def restart(self) -> None:
         """Replaces the pool."""
-        self._parent.close()
-        self._executor.shutdown()
+        self.__exit__()
         self._start()
 
     def _start(self) -> None:
@@ -143,11 +136,7 @@ class DaskWorkers(Workers):
     """
 
     def __init__(self, address: str, most: int | None = None) -> None:
-        """Connects to at most `most` (by default all) workers of the scheduler at an address.
-
-        Raises:
-            ClusterError: Dask is not installed, or no scheduler answers.
-        """
+        """Connects to at most `most` (default: all) workers; raises a ClusterError if it fails."""
         try:
             from distributed import Client
         except ModuleNotFoundError:
@@ -174,15 +163,11 @@ class DaskWorkers(Workers):
             ) from error
         self._executor = self._client.get_executor(pure=False)
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+    def __exit__(self, *exception: object) -> None:
         self._client.close(timeout=CONNECT_S)  # Scheduler and workers keep running.
 
     def capacity(self) -> int:
-        """Returns the number of workers.
-
-        Raises:
-            ClusterError: A worker has several threads, or the connection is lost.
-        """
+        """Returns the number of workers; raises a ClusterError if one has several threads."""
         try:
             threads: dict[str, int] = self._client.nthreads()
         except Exception as error:

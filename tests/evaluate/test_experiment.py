@@ -256,7 +256,7 @@ def test_unknown_methods_and_results_of_other_scenarios_are_rejected_before_any_
     run_evaluation(asked, say=quiet)
     make_library(tmp_path / "other", overrides="{stop: {timeout_s: 0.4}}")
     calls.clear()
-    with pytest.raises(LibraryError, match="holds reaches of a different scenario"):
+    with pytest.raises(LibraryError, match="holds reaches of scenario"):
         run_evaluation(replace(asked, experience=tmp_path / "other"), say=quiet)
     assert calls == []
 

@@ -9,7 +9,7 @@ from support.fake_reach import comparable, make_record, make_request
 
 from lic_drake.errors import LibraryError
 from lic_drake.experience.collect import REQUEST_FILE, write_request
-from lic_drake.experience.store import COMPACTED, ExperienceLibrary, merge_libraries
+from lic_drake.experience.store import ExperienceLibrary, merge_libraries
 from lic_drake.reach.scenario import load_scenario
 
 REQUEST = make_request()
@@ -61,15 +61,15 @@ def test_compacting_merges_shards_without_duplicates_and_is_idempotent(
 ) -> None:
     library.write_shard("new", [*RECORDS[2], RECORDS[0][3]], SCENARIO)
     library.compact()
-    assert names(library) == [f"{COMPACTED}.parquet"]
+    assert names(library) == ["reaches.parquet"]
     expected = RECORDS[0] + RECORDS[1] + RECORDS[2]
     assert sorted(comparable(library.records())) == sorted(comparable(expected))
     assert library.scenario() == SCENARIO
     # Rows are grouped by environment.
     assert list(library.columns()["environment"]) == sorted(r.environment for r in expected)
-    content = library.shard_path(COMPACTED).read_bytes()
+    content = library.shard_path("reaches").read_bytes()
     library.compact()
-    assert library.shard_path(COMPACTED).read_bytes() == content
+    assert library.shard_path("reaches").read_bytes() == content
 
 
 def test_a_kill_between_writing_and_deleting_loses_nothing(
@@ -82,7 +82,7 @@ def test_a_kill_between_writing_and_deleting_loses_nothing(
             library.compact()
     assert len(names(library)) == 3
     library.compact()
-    assert names(library) == [f"{COMPACTED}.parquet"]
+    assert names(library) == ["reaches.parquet"]
     assert sorted(comparable(library.records())) == sorted(before)
 
 
