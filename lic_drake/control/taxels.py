@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lic_drake.robots.arm import Arm
-from lic_drake.robots.skin import SkinShape
+from lic_drake.robots.arm import Arm, SkinShape
 from lic_drake.types import BoolVector, IntVector, Vector
 
 CAP_ANGLES_DEG = (-72.0, -36.0, 0.0, 36.0, 72.0)

@@ -1,11 +1,13 @@
 """`Arm`: a robot arm with an impedance controller and a tactile skin, from a model file."""
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import cast
 
 import numpy as np
-from pydrake.geometry import Box, SceneGraph
+from pydrake.geometry import Box, Capsule, Cylinder, SceneGraph, SceneGraphInspector
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
@@ -15,18 +17,51 @@ from pydrake.multibody.tree import (
     ModelInstanceIndex,
     PrismaticJoint,
     RevoluteJoint,
+    RigidBody,
     SpatialInertia,
     UnitInertia,
 )
 from pydrake.systems.framework import Context
 
 from lic_drake.errors import ScenarioError
-from lic_drake.robots.kinematics import ArmGeometry, ArmPose, Kinematics
-from lic_drake.robots.skin import read_skin
+from lic_drake.robots.kinematics import ArmPose, Kinematics
 from lic_drake.types import IntVector, Vector
 
 _FLOOR = "floor_mount"
 _BASE_COLOR = np.array([0.35, 0.35, 0.38, 1.0])
+_ALONG = (
+    np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+    np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
+    np.eye(3),
+)
+"""Rotations R_SC that lay the capsule's axis Cz along Sx, Sy and Sz."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SkinShape:
+    """A shape of the arm's surface, which carries tactile skin; frame S lies in its centre.
+
+    Attributes:
+        link: Name of the body that carries it.
+        kind: "capsule" or "cylinder" (axis along Sz), or "box".
+        size: Radius and length of the cylindrical part, or edges along Sx, Sy and Sz, metres.
+        R_LS: Rotation of S in the link frame, shape (3, 3).
+        p_LS: Position of the centre in the link frame, shape (3,), metres.
+    """
+
+    link: str
+    kind: str
+    size: tuple[float, ...]
+    R_LS: Vector
+    p_LS: Vector
+
+    def enclosing_capsule(self) -> "SkinShape":
+        """Returns a capsule that holds the whole shape, its axis along the longest edge."""
+        if self.kind != "box":
+            return replace(self, kind="capsule")
+        axis = int(np.argmax(self.size))
+        size = (0.5 * math.hypot(*np.delete(self.size, axis)), self.size[axis])
+        return replace(self, kind="capsule", size=size, R_LS=self.R_LS @ _ALONG[axis])
 
 
 class Arm:
@@ -38,16 +73,15 @@ class Arm:
 
     Args:
         name: Name in scenario files.
-        model: The model: URDF or SDF file, or URDF text.
+        model: URDF or SDF file, or URDF text.
         base_frame: Frame that is welded to R.
         tip_frame: Frame E of the hand, which points along Ex.
-        skin_links: Bodies that carry skin, proximal to distal; by default those that the joints
-            move and that have collision geometry. All their collision shapes are skin.
+        skin_links: Bodies whose collision shapes are skin, proximal to distal; by default those
+            that the joints move and that have such shapes.
         q_min: Lower joint limits, shape (m,), radians, where narrower than the model's.
         q_max: Upper joint limits, shape (m,), radians.
         held: Joints that are held at positions, metres or radians.
-        carriage: The joints along x, y and z that carry R in the model of a mobile robot: those
-            of its base and its torso.
+        carriage: The joints along x, y and z that carry R in the model of a mobile robot.
         height_range_m: Lowest and highest position of R along z, metres.
         is_planar: Whether the arm moves in the plane z = 0; hand poses are then (x, y, phi).
         kinematics: A class that knows some of the kinematics in closed form.
@@ -55,13 +89,11 @@ class Arm:
     Attributes:
         link_names: Names of the bodies that carry skin.
         skin: Their collision shapes.
-        q_min: Lower joint limits, shape (m,), radians.
-        q_max: Upper joint limits, shape (m,), radians.
         stiffness: Joint stiffness of the impedance controller, shape (m,), Nm/rad.
         damping: Its joint damping, shape (m,), Nms/rad.
+        p_RJ: Origins of the m joints and of the tip at q = 0, shape (m + 1, 3), metres.
         p_RS: The first joint, about which the whole arm turns, shape (3,), metres.
         reach_m: Upper bound of the tip's distance from it, metres.
-        kinematics: See `calc_pose`, `solve_ik` and `solve_pointing`.
 
     Raises:
         ScenarioError: The model cannot be read or is not such an arm.
@@ -83,12 +115,9 @@ class Arm:
         is_planar: bool = False,
         kinematics: type[Kinematics] = Kinematics,
     ) -> None:
-        self.name = name
-        self.is_planar = is_planar
+        self.name, self.is_planar = name, is_planar
         self.base_frame, self.tip_frame = base_frame, tip_frame
-        self._model = model
-        self._held = dict(held or {})
-        self._carriage = carriage
+        self._model, self._held, self._carriage = model, dict(held or {}), carriage
         self.height_range_m = height_range_m
         plant = MultibodyPlant(time_step=1e-3)
         scene_graph = SceneGraph()
@@ -121,36 +150,25 @@ class Arm:
         return self._last[1]
 
     def point_jacobians(self, pose: ArmPose, links: IntVector, p_RQ: Vector) -> Vector:
-        """Returns Jv_v_RQ of points Q on skin links, shape (n, 3, m), m/rad.
-
-        Args:
-            pose: The arm's pose.
-            links: Index into `link_names` of each point's link, shape (n,).
-            p_RQ: Positions of the points, shape (n, 3), metres.
-        """
+        """Returns Jv_v_RQ of points Q, shape (n, 3), on skin links, shape (n,): (n, 3, m), m/rad."""
         jacobians: Vector = (p_RQ @ pose.turn).reshape(-1, 3, self.num_joints) - pose.moment
         jacobians *= self._moves[links][:, None]
         return jacobians
 
     def tip_pose(self, q: Vector) -> Vector:
-        """Returns the hand pose x0 in R of joint angles q, shape (pose_size,)."""
+        """Returns the hand pose x0 in R, shape (pose_size,)."""
         return self.kinematics.tip_pose(q)
 
     def solve_ik(self, x0_R: Vector, near: Vector | None = None) -> Vector:
-        """Returns joint angles for a hand pose, shape (n, m), see `Kinematics.solve_ik`."""
+        """See `Kinematics.solve_ik`."""
         return self.kinematics.solve_ik(x0_R, near)
 
     def solve_pointing(self, p_RE: Vector, u_R: Vector) -> list[Vector]:
-        """Returns joint angles that point from places; see `Kinematics.solve_pointing`."""
+        """See `Kinematics.solve_pointing`."""
         return self.kinematics.solve_pointing(p_RE, u_R)
 
     def positions(self, b0: Vector, q: Vector) -> Vector:
-        """Returns the positions of the mobile arm in a plant, shape (.., 3 + m).
-
-        Args:
-            b0: Position of R, shape (3,), metres.
-            q: Joint angles, shape (.., m), radians.
-        """
+        """Returns the positions of the mobile arm in a plant for q, shape (.., m): (.., 3 + m)."""
         return np.concatenate([np.broadcast_to(b0, (*q.shape[:-1], 3)), q], axis=-1)
 
     def add_to_plant(
@@ -165,12 +183,13 @@ class Arm:
         Args:
             plant: The plant, not yet finalized.
             parent: The frame that becomes R; by default the world's.
-            mobile: Whether b0 = (x, y, z) are positions, too: those of joints that carry R, which
-                nothing drives. For drawings and for a robot that looks for a place to reach from.
-            height_m: Where the arm does not move but its robot has a torso, how far R is above the
-                robot's floor, metres; see `set_height`.
+            mobile: Whether b0 = (x, y, z) are positions, too, of joints that nothing drives.
+            height_m: How far R is above the floor of a robot with a torso; see `set_height`.
         """
-        (arm,) = _parse(plant, self._model)
+        if isinstance(self._model, Path):
+            (arm,) = Parser(plant).AddModels(str(self._model))
+        else:
+            (arm,) = Parser(plant).AddModelsFromString(self._model, "urdf")
         plant.set_gravity_enabled(arm, False)
         held = dict(self._held)
         parent = parent or plant.world_frame()
@@ -189,14 +208,8 @@ class Arm:
     ) -> None:
         """Moves the robot's body to another height of its torso; arm and R stay where they are.
 
-        The one place where a reach's diagram knows of a torso: the body hangs from R, and arm and
-        body must not collide.
-
-        Args:
-            plant: A plant with the arm that is not mobile.
-            context: The plant's context.
-            arm: The arm in it.
-            height_m: How far R is above the robot's floor, metres.
+        The one place where a reach's diagram knows of a torso: the body hangs from R, how far R is
+        above the robot's floor, and arm and body must not collide.
         """
         if self._carriage is not None:
             for name, z in ((_FLOOR, -height_m), (self._carriage[2], height_m)):
@@ -204,7 +217,7 @@ class Arm:
                 frame.SetPoseInParentFrame(context, RigidTransform(np.array([0.0, 0.0, z])))
 
     def check_height(self, height_m: float) -> None:
-        """Raises a `ScenarioError` if R cannot be at a height, metres."""
+        """Raises a `ScenarioError` if R cannot be at this height."""
         low, high = self.height_range_m
         if not low <= height_m <= high:
             raise ScenarioError(
@@ -219,12 +232,7 @@ class Arm:
         limits: tuple[Vector | None, Vector | None],
         kinematics: type[Kinematics],
     ) -> None:
-        """Takes everything but names from the model.
-
-        Raises:
-            RuntimeError: Drake cannot parse it, or misses something in it.
-            ValueError: It is not an arm as this class knows it.
-        """
+        """Takes everything but names from the model; Drake's errors are RuntimeErrors."""
         arm = self.add_to_plant(plant)
         plant.Finalize()
         joints = [plant.get_joint(index) for index in plant.GetJointIndices(arm)]
@@ -237,24 +245,20 @@ class Arm:
             raise ValueError(
                 f"it has {len(joints)} revolute joints and {plant.num_positions()} positions"
             )
-        low, high = (
-            np.array(end)
-            for end in (plant.GetPositionLowerLimits(), plant.GetPositionUpperLimits())
-        )
+        low, high = plant.GetPositionLowerLimits().copy(), plant.GetPositionUpperLimits().copy()
         self.q_min = low if limits[0] is None else np.maximum(low, limits[0])
         self.q_max = high if limits[1] is None else np.minimum(high, limits[1])
         if not np.all(np.isfinite([self.q_min, self.q_max])):
             raise ValueError("a joint has no limits; give q_min and q_max")
-        actuators = {
-            actuator.joint().name(): actuator
-            for actuator in map(plant.get_joint_actuator, plant.GetJointActuatorIndices(arm))
+        actuators = map(plant.get_joint_actuator, plant.GetJointActuatorIndices(arm))
+        gains = {
+            a.joint().name(): a.get_controller_gains() for a in actuators if a.has_controller()
         }
         for joint in joints:
-            if joint.name() not in actuators or not actuators[joint.name()].has_controller():
+            if joint.name() not in gains:
                 raise ValueError(f"joint {joint.name()} needs an actuator with controller gains")
-        gains = [actuators[joint.name()].get_controller_gains() for joint in joints]
-        self.stiffness = np.array([gain.p for gain in gains])
-        self.damping = np.array([gain.d for gain in gains])
+        self.stiffness = np.array([gains[joint.name()].p for joint in joints])
+        self.damping = np.array([gains[joint.name()].d for joint in joints])
 
         moved = [plant.GetBodiesKinematicallyAffectedBy([joint.index()]) for joint in joints]
         if skin_links is None:
@@ -266,7 +270,7 @@ class Arm:
         self.link_names = tuple(skin_links)
         links = [plant.GetBodyByName(link, arm) for link in skin_links]
         inspector = scene_graph.model_inspector()
-        self.skin = tuple(shape for link in links for shape in read_skin(plant, inspector, link))
+        self.skin = tuple(shape for link in links for shape in _read_skin(plant, inspector, link))
         if {shape.link for shape in self.skin} != set(self.link_names) or not self.skin:
             raise ValueError("every skin link needs a collision shape")
         if self.is_planar and any(shape.kind != "capsule" for shape in self.skin):
@@ -276,19 +280,10 @@ class Arm:
         context = plant.CreateDefaultContext()
         tip = plant.GetFrameByName(self.tip_frame, arm)
         frames = [joint.frame_on_parent() for joint in joints] + [tip]
-        p_RJ = np.array([frame.CalcPoseInWorld(context).translation() for frame in frames])
-        self.p_RS = p_RJ[0]
-        self.reach_m = float(np.linalg.norm(np.diff(p_RJ, axis=0), axis=1).sum())
-        geometry = ArmGeometry(
-            is_planar=self.is_planar, q_min=self.q_min, q_max=self.q_max, p_RJ=p_RJ
-        )
-        self.kinematics = kinematics(geometry, plant, [link.body_frame() for link in links], tip)
-
-
-def _parse(plant: MultibodyPlant, model: str | Path) -> list[ModelInstanceIndex]:
-    if isinstance(model, Path):
-        return Parser(plant).AddModels(str(model))
-    return Parser(plant).AddModelsFromString(model, "urdf")
+        self.p_RJ = np.array([frame.CalcPoseInWorld(context).translation() for frame in frames])
+        self.p_RS = self.p_RJ[0]
+        self.reach_m = float(np.linalg.norm(np.diff(self.p_RJ, axis=0), axis=1).sum())
+        self.kinematics = kinematics(self, plant, [link.body_frame() for link in links], tip)
 
 
 def _add_carriage(plant: MultibodyPlant, arm: ModelInstanceIndex, frame: Frame) -> Frame:
@@ -308,10 +303,9 @@ def _add_carriage(plant: MultibodyPlant, arm: ModelInstanceIndex, frame: Frame) 
 def _hold_joints(
     plant: MultibodyPlant, arm: ModelInstanceIndex, positions: Mapping[str, float]
 ) -> None:
-    """Replaces joints by welds at positions, before the plant is finalized.
+    """Replaces joints by welds, and frames of their names, at positions.
 
-    A frame with a joint's name is where the joint was, at its position. `Joint.Lock` would neither
-    work with an integrator's continuous plant nor save any time.
+    `Joint.Lock` would neither work with an integrator's continuous plant nor save any time.
     """
     for actuator in map(plant.get_joint_actuator, plant.GetJointActuatorIndices()):
         if actuator.model_instance() == arm and actuator.joint().name() in positions:
@@ -329,3 +323,23 @@ def _hold_joints(
         parent, child = joint.frame_on_parent(), joint.frame_on_child()
         plant.RemoveJoint(joint)
         plant.WeldFrames(plant.AddFrame(FixedOffsetFrame(name, parent, X_PC, arm)), child)
+
+
+def _read_skin(
+    plant: MultibodyPlant, inspector: SceneGraphInspector, link: RigidBody
+) -> Iterator[SkinShape]:
+    """Yields the collision shapes of a link."""
+    for geometry in plant.GetCollisionGeometriesForBody(link):
+        shape, X_LS = inspector.GetShape(geometry), inspector.GetPoseInFrame(geometry)
+        kind = type(shape).__name__
+        if isinstance(shape, Box):
+            size = tuple(shape.size().tolist())
+        elif isinstance(shape, Capsule | Cylinder):
+            size = (shape.radius(), shape.length())
+        else:
+            raise ValueError(
+                f"{link.name()}: skin must be capsules, boxes or cylinders, found {kind}"
+            )
+        # Copies: arrays that Drake returns may keep the plant alive.
+        R_LS, p_LS = np.array(X_LS.rotation().matrix()), np.array(X_LS.translation())
+        yield SkinShape(link=link.name(), kind=kind.lower(), size=size, R_LS=R_LS, p_LS=p_LS)

@@ -5,9 +5,8 @@ pose x0 is (x, y, phi) for an arm in the plane, else position and quaternion (w,
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from pydrake.common.eigen_geometry import Quaternion
@@ -17,6 +16,9 @@ from pydrake.multibody.tree import Frame, JacobianWrtVariable
 from scipy.spatial.transform import Rotation
 
 from lic_drake.types import BoolVector, Vector
+
+if TYPE_CHECKING:
+    from lic_drake.robots.arm import Arm
 
 IK_TOLERANCE = 1e-10
 """Largest error of a numerical inverse kinematics solution, metres and radians."""
@@ -67,44 +69,20 @@ def wrap_angle(angle: float) -> float:
     return float((angle + np.pi) % (2.0 * np.pi) - np.pi)
 
 
-@dataclass(frozen=True, kw_only=True)
-class ArmGeometry:
-    """What kinematics need of an arm's model.
-
-    Attributes:
-        is_planar: Whether the arm moves in the plane z = 0 and hand poses are (x, y, phi).
-        q_min: Lower joint limits, shape (m,), radians.
-        q_max: Upper joint limits, shape (m,), radians.
-        p_RJ: Origins of the m joints and of the tip at q = 0, shape (m + 1, 3), metres.
-    """
-
-    is_planar: bool
-    q_min: Vector
-    q_max: Vector
-    p_RJ: Vector
-
-
 class Kinematics:
     """Kinematics of an arm from its model; subclasses override what they know in closed form.
 
-    Attributes:
-        arm: The arm's geometry.
-        q_min: Lower joint limits, shape (m,), radians.
-        q_max: Upper joint limits, shape (m,), radians.
+    Args:
+        arm: The arm, of which limits and joints are known.
+        plant: A plant with the arm alone, whose positions are q and whose world frame is R.
+        links: Frames of the skin links.
+        tip: Frame E.
     """
 
     def __init__(
-        self, arm: ArmGeometry, plant: MultibodyPlant, links: Sequence[Frame], tip: Frame
+        self, arm: "Arm", plant: MultibodyPlant, links: Sequence[Frame], tip: Frame
     ) -> None:
-        """Sets up kinematics.
-
-        Args:
-            arm: The arm's geometry.
-            plant: A plant with the arm alone, whose positions are q and whose world frame is R.
-            links: Frames of the skin links.
-            tip: Frame E.
-        """
-        self.arm = arm
+        self.is_planar = arm.is_planar
         self.q_min, self.q_max = arm.q_min, arm.q_max
         self._plant, self._links, self._tip = plant, links, tip
         self._context = plant.CreateDefaultContext()
@@ -135,28 +113,23 @@ class Kinematics:
     def tip_pose(self, q: Vector) -> Vector:
         """Returns x0: (x, y, phi) with phi in [-pi, pi), or p_RE and quaternion with w >= 0."""
         pose = self.calc_pose(q)
-        if self.arm.is_planar:
+        if self.is_planar:
             return np.array([*pose.p_RE[:2], np.arctan2(pose.R_RE[1, 0], pose.R_RE[0, 0])])
         wxyz = RotationMatrix(pose.R_RE).ToQuaternion().wxyz()
         return np.concatenate((pose.p_RE, wxyz if wxyz[0] >= 0.0 else -wxyz))
 
     def solve_ik(self, x0: Vector, near: Vector | None = None) -> Vector:
-        """Returns configurations within the joint limits for a hand pose, shape (n, m).
+        """Returns configurations within the joint limits for a hand pose in R, shape (n, m).
 
-        Args:
-            x0: Hand pose in R; a quaternion may have any positive norm.
-            near: Joint angles near which to search, shape (m,), radians.
-
-        Returns:
-            Those of lowest preselection cost first or, with `near`, the nearest first. A redundant
-            arm has infinitely many, of which this is a sample.
+        A redundant arm has infinitely many, of which this is a sample: those of lowest preselection
+        cost first or, with `near`, the nearest first. A quaternion may have any positive norm.
         """
         p_RE, R_RE = rigid_pose(x0)
 
         def missing(pose: ArmPose) -> tuple[Vector, Vector]:
             turn = Rotation.from_matrix(R_RE @ pose.R_RE.T).as_rotvec()
             error, J = np.append(p_RE - pose.p_RE, turn), np.vstack([pose.Jv_E, pose.Jw_E])
-            rows = [0, 1, 5] if self.arm.is_planar else slice(None)
+            rows = [0, 1, 5] if self.is_planar else slice(None)
             return error[rows], J[rows]
 
         if near is not None:
@@ -165,23 +138,17 @@ class Kinematics:
         return self._cheapest_first(self._newton(missing, self._seeds))
 
     def solve_pointing(self, p_RE: Vector, u_R: Vector) -> list[Vector]:
-        """Returns configurations with the tip at places and pointing one way, k times (n, m).
+        """Returns configurations with the tip at each of k places, shape (k, 3), pointing along u_R.
 
-        Args:
-            p_RE: Places of the tip, shape (k, 3), metres.
-            u_R: Unit vector along which the tip is to point, shape (3,).
-
-        Returns:
-            For each place those within the joint limits, of lowest preselection cost first.
+        For each place those within the joint limits, shape (n, m), lowest preselection cost first.
         """
         return [self._point(p, u_R) for p in p_RE]
 
     def calc_preselection_cost(self, q: Vector) -> Vector:
         """Returns the cost of Eq. (5) of configurations, shape (n, m), as shape (n,), 1/m.
 
-        C = 1 / (|x'p_tw| + |x'p_te|) with p_tw and p_te from the tool to wrist and elbow and x from
-        the robot to the clutter: low where hand and forearm point into the clutter. Here the wrist
-        is the last link's origin and the elbow the middle link's.
+        C = 1 / (|x'p_tw| + |x'p_te|) with p_tw and p_te from the tool to wrist and elbow, here the
+        origins of the last and the middle link: low where hand and forearm point into the clutter.
         """
         behind = np.empty(len(q))
         for i, row in enumerate(q):
@@ -191,7 +158,7 @@ class Kinematics:
         return 1.0 / np.maximum(behind, 1e-9)
 
     def _point(self, p_RE: Vector, u_R: Vector) -> Vector:
-        if self.arm.is_planar:
+        if self.is_planar:
             return self.solve_ik(np.array([p_RE[0], p_RE[1], np.arctan2(u_R[1], u_R[0])]))
 
         def missing(pose: ArmPose) -> tuple[Vector, Vector]:
@@ -209,18 +176,15 @@ class Kinematics:
 
     @cached_property
     def _seeds(self) -> Vector:
-        """Joint angles from which searches begin, always the same, shape (n, m)."""
-        rng = np.random.default_rng(0)
-        return rng.uniform(self.q_min, self.q_max, (_NUM_SEEDS, len(self.q_min)))
+        shape = (_NUM_SEEDS, len(self.q_min))
+        return np.random.default_rng(0).uniform(self.q_min, self.q_max, shape)
 
     def _newton(
         self, missing: Callable[[ArmPose], tuple[Vector, Vector]], seeds: Sequence[Vector] | Vector
     ) -> Vector:
         """Returns the distinct solutions that damped Newton steps within the limits come to.
 
-        Args:
-            missing: Gives the error that is left at a pose and its Jacobian.
-            seeds: Joint angles to begin from.
+        `missing` gives the error that is left at a pose, and its Jacobian.
         """
         found: list[Vector] = []
         for q in seeds:

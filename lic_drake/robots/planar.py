@@ -13,7 +13,6 @@ from lic_drake.paths import models_dir
 from lic_drake.robots.arm import Arm
 from lic_drake.robots.kinematics import (
     LIMIT_TOLERANCE,
-    ArmGeometry,
     ArmPose,
     Kinematics,
     cross_matrix,
@@ -33,14 +32,7 @@ class PlanarKinematics(Kinematics):
     is short in the plane.
     """
 
-    def __init__(
-        self, arm: ArmGeometry, plant: MultibodyPlant, links: Sequence[Frame], tip: Frame
-    ) -> None:
-        """Sets up kinematics, see `Kinematics`.
-
-        Raises:
-            ValueError: The model is another kind of arm.
-        """
+    def __init__(self, arm: Arm, plant: MultibodyPlant, links: Sequence[Frame], tip: Frame) -> None:
         super().__init__(arm, plant, links, tip)
         if len(arm.q_min) != 3:
             raise ValueError(f"it has {len(arm.q_min)} degrees of freedom, not 3")
@@ -94,10 +86,9 @@ class PlanarKinematics(Kinematics):
         return np.array([tip[0], tip[1], wrap_angle(float(np.sum(q)) - 0.5 * np.pi)])
 
     def solve_ik(self, x0: Vector, near: Vector | None = None) -> Vector:
-        """Returns the configuration of a hand pose, shape (1, 3), or (0, 3) if there is none.
+        """See `Kinematics.solve_ik`; without `near` only the branch with q2 >= 0, if it is legal.
 
-        Where both elbow branches keep the limits it is the one with q2 >= 0: on the start line that
-        is the only one nearly everywhere. With `near` both are returned, the nearer one first.
+        On the start line that is the only one nearly everywhere.
         """
         l1, l2, l3 = self.link_lengths
         phi = float(x0[2])
@@ -107,14 +98,11 @@ class PlanarKinematics(Kinematics):
         if abs(cos_q2) <= 1.0 + 1e-12:  # Rounding must not refuse a straight elbow.
             bend = np.arccos(np.clip(cos_q2, -1.0, 1.0))
             for q2 in (bend, -bend):
-                first_link = np.arctan2(wrist[1], wrist[0]) - np.arctan2(
-                    l2 * np.sin(q2), l1 + l2 * np.cos(q2)
-                )
-                q1 = wrap_angle(first_link + 0.5 * np.pi)
+                inner = np.arctan2(l2 * np.sin(q2), l1 + l2 * np.cos(q2))
+                q1 = wrap_angle(np.arctan2(wrist[1], wrist[0]) - inner + 0.5 * np.pi)
                 q = np.array([q1, q2, wrap_angle(phi + 0.5 * np.pi - q1 - q2)])
-                if np.all(q >= self.q_min - LIMIT_TOLERANCE) and np.all(
-                    q <= self.q_max + LIMIT_TOLERANCE
-                ):
+                beyond = np.maximum(self.q_min - q, q - self.q_max)
+                if np.all(beyond <= LIMIT_TOLERANCE):
                     found.append(q)
         if near is None:
             return np.array(found[:1]).reshape(-1, 3)
@@ -127,10 +115,8 @@ def make_planar_arm(name: str, model: str | Path) -> Arm:
 
     Args:
         name: Name in scenario files.
-        model: URDF file or text like models/planar_arm.urdf: base and link1 to link3, each of the
-            latter with a collision capsule; three joints with limits turn about +z; at zero the arm
-            points along -y from the origin of the base to the frame tip; each actuator has
-            controller gains.
+        model: URDF file or text like models/planar_arm.urdf: three links with a collision capsule
+            each, whose joints turn about +z; at zero they point along -y from base to tip.
 
     Raises:
         ScenarioError: The model cannot be read or describes another kind of arm.

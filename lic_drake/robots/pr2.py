@@ -13,13 +13,8 @@ from lic_drake.robots.pr2_kinematics import Pr2Kinematics
 from lic_drake.types import Vector
 
 JOINTS = (
-    "shoulder_pan",
-    "shoulder_lift",
-    "upper_arm_roll",
-    "elbow_flex",
-    "forearm_roll",
-    "wrist_flex",
-    "wrist_roll",
+    *("shoulder_pan", "shoulder_lift", "upper_arm_roll", "elbow_flex"),
+    *("forearm_roll", "wrist_flex", "wrist_roll"),
 )
 """The joints of an arm, without side and suffix; each moves a link of its name."""
 
@@ -29,21 +24,14 @@ CARRIAGE = ("x", "y", "torso_lift_joint")
 TORSO_RANGE_M = (0.0115, 0.305)
 """Soft limits of the torso lift, metres (PR2/pr2_common, commit e1f9029, BSD)."""
 
-MPC_LIMITS_DEG = np.array(
-    [
-        [-109.0, 26.0],
-        [-24.0, 68.0],
-        [-220.0, 41.0],
-        [-132.0, 0.0],
-        [-270.0, 270.0],
-        [-120.0, 0.0],
-        [-180.0, 180.0],
-    ]
-)
+MPC_MIN_DEG = (-109.0, -24.0, -220.0, -132.0, -270.0, -120.0, -180.0)
 """Joint limits of the controller (gt-ros-pkg/hrl-haptic-manip, facts only), mirrored to the right.
 
 They give the continuous joints an end, as cables do.
 """
+
+MPC_MAX_DEG = (26.0, 68.0, 41.0, 0.0, 270.0, 0.0, 180.0)
+"""Their upper ends."""
 
 Q_HOME: Vector = np.deg2rad([-40.0, 20.0, -90.0, -90.0, 0.0, -45.0, 0.0])
 """A posture of ours: elbow out to the side, hand before the body, nothing near a limit, radians."""
@@ -65,21 +53,12 @@ TILT_AXIS = (0.05093, 0.0, 0.38145)
 
 
 def make_pr2(heading: float = 0.0, head_tilt_deg: float = 0.0) -> Arm:
-    """Returns the right arm of a PR2, with the rest of the robot.
-
-    Args:
-        heading: Of the base, held, radians.
-        head_tilt_deg: How far the head looks down, degrees.
-
-    Raises:
-        ScenarioError: The head cannot go there.
-    """
+    """Returns the right arm of a PR2 with a heading, radians, and its head tilted downwards."""
     low, high = HEAD_TILT_RANGE_DEG
     if not low <= head_tilt_deg <= high:
         raise ScenarioError(
             f"the PR2's head_tilt_deg must be from {low} to {high}, got {head_tilt_deg}"
         )
-    mpc_min, mpc_max = np.deg2rad(MPC_LIMITS_DEG).T
     left = (f"l_{joint}_joint" for joint in JOINTS)
     return Arm(
         "pr2",
@@ -87,8 +66,8 @@ def make_pr2(heading: float = 0.0, head_tilt_deg: float = 0.0) -> Arm:
         base_frame="base_link_for_rbt_compat",
         tip_frame="r_gripper_tool_frame",
         skin_links=[f"r_{joint}_link" for joint in JOINTS],
-        q_min=mpc_min,
-        q_max=mpc_max,
+        q_min=np.deg2rad(MPC_MIN_DEG),
+        q_max=np.deg2rad(MPC_MAX_DEG),
         held={"theta": heading} | dict(zip(left, LEFT_ARM_AT_REST, strict=True)),
         carriage=CARRIAGE,
         height_range_m=TORSO_RANGE_M,

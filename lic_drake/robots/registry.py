@@ -12,12 +12,9 @@ _ROBOTS: Registry[Callable[[], Arm]] = Registry("robot", ScenarioError)
 
 
 def register_robot(name: str, make: Callable[[], Arm]) -> None:
-    """Makes a robot known under a name.
+    """Makes a robot known under a name in scenario files.
 
-    Args:
-        name: What scenario files call it.
-        make: Returns the robot, which satisfies `lic_drake.robots.arm.Arm`; every reach asks for
-            it, so it should be decorated with `functools.cache`.
+    `make` is asked by every reach, so it should be decorated with `functools.cache`.
 
     Raises:
         ScenarioError: The name is taken, or `make` cannot be called.
@@ -31,11 +28,7 @@ def register_robot(name: str, make: Callable[[], Arm]) -> None:
 
 
 def get_robot(name: str) -> Arm:
-    """Returns a robot.
-
-    Raises:
-        ScenarioError: The robot is unknown.
-    """
+    """Returns a robot; a ScenarioError if it is unknown."""
     return _ROBOTS.get(name)()
 
 

@@ -30,7 +30,7 @@ class Hand(NamedTuple):
     @classmethod
     def of(cls, arm: Arm) -> Self:
         """Returns the hand of an arm."""
-        last, tip = arm.kinematics.arm.p_RJ[-2:]
+        last, tip = arm.p_RJ[-2:]
         shapes = [s.enclosing_capsule() for s in arm.skin if s.link == arm.link_names[-1]]
         return cls(float(np.linalg.norm(tip - last)), max(shape.size[0] for shape in shapes))
 

@@ -14,9 +14,9 @@ from lic_drake.control.taxels import (
     planar_taxels,
     surface_taxels,
 )
+from lic_drake.robots.arm import SkinShape
 from lic_drake.robots.planar import planar_arm
 from lic_drake.robots.pr2 import Q_HOME, pr2_arm
-from lic_drake.robots.skin import SkinShape
 
 ARM = planar_arm()
 LAYOUT = make_taxels(ARM, 100.0)

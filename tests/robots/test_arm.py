@@ -10,7 +10,7 @@ from pydrake.multibody.tree import FixedOffsetFrame, JacobianWrtVariable
 from support.five_joint_arm import describe, five_joint_arm
 
 from lic_drake.errors import ScenarioError
-from lic_drake.robots.arm import Arm
+from lic_drake.robots.arm import Arm, SkinShape
 from lic_drake.robots.kinematics import rigid_pose
 from lic_drake.robots.planar import planar_arm
 from lic_drake.robots.pr2 import Q_HOME, make_pr2, pr2_arm
@@ -193,3 +193,24 @@ def test_limits_can_be_narrowed_and_joints_held() -> None:
     q = np.array([0.1, -0.2, 0.3, 0.4])
     whole = FIVE.calc_pose(np.append(q, 0.3))
     np.testing.assert_allclose(arm.calc_pose(q).p_RE, whole.p_RE, atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["box", "cylinder"])
+@given(*(st.tuples(*[st.floats(low, high)] * 3) for low, high in ((0.005, 0.5), (-3.0, 3.0))))
+def test_the_capsule_of_a_shape_touches_its_edges(
+    kind: str, edges: tuple[float, ...], rpy: tuple[float, ...]
+) -> None:
+    R_LS = RollPitchYaw(rpy).ToRotationMatrix().matrix()
+    size = edges if kind == "box" else edges[:2]
+    shape = SkinShape(link="link", kind=kind, size=size, R_LS=R_LS, p_LS=np.array([0.1, -0.2, 0.3]))
+    p_SQ = 0.5 * np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1).T * edges
+    if kind == "cylinder":
+        angle, height = np.meshgrid(np.linspace(0.0, 6.0, 7), [-0.5 * size[1], 0.5 * size[1]])
+        rims = np.stack([size[0] * np.cos(angle), size[0] * np.sin(angle), height], axis=-1)
+        p_SQ = rims.reshape(-1, 3)
+    capsule = shape.enclosing_capsule()
+    p_CQ = (shape.p_LS + p_SQ @ R_LS.T - capsule.p_LS) @ capsule.R_LS
+    p_CQ[:, 2] -= np.clip(p_CQ[:, 2], -0.5 * capsule.size[1], 0.5 * capsule.size[1])
+    np.testing.assert_allclose(np.linalg.norm(p_CQ, axis=1), capsule.size[0], atol=1e-12)
+    if kind == "box":  # Its axis is the longest edge.
+        assert capsule.size[1] == max(edges)
