@@ -150,7 +150,7 @@ class Arm:
         return self._last[1]
 
     def point_jacobians(self, pose: ArmPose, links: IntVector, p_RQ: Vector) -> Vector:
-        """Returns Jv_v_RQ of points Q, shape (n, 3), on skin links, shape (n,): (n, 3, m), m/rad."""
+        """Returns Jv_v_RQ, shape (n, 3, m), m/rad, of points p_RQ, shape (n, 3), on skin links."""
         jacobians: Vector = (p_RQ @ pose.turn).reshape(-1, 3, self.num_joints) - pose.moment
         jacobians *= self._moves[links][:, None]
         return jacobians

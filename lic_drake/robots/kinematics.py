@@ -138,9 +138,9 @@ class Kinematics:
         return self._cheapest_first(self._newton(missing, self._seeds))
 
     def solve_pointing(self, p_RE: Vector, u_R: Vector) -> list[Vector]:
-        """Returns configurations with the tip at each of k places, shape (k, 3), pointing along u_R.
+        """Returns configurations with the tip at each of k places, pointing along u_R.
 
-        For each place those within the joint limits, shape (n, m), lowest preselection cost first.
+        For each place those within the limits, shape (n, m), lowest preselection cost first.
         """
         return [self._point(p, u_R) for p in p_RE]
 
