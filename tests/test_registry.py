@@ -12,7 +12,7 @@ from lic_drake.clutter.registry import get_category, register_category
 from lic_drake.errors import EstimateError, LicError, ScenarioError
 from lic_drake.estimate import registry as estimate
 from lic_drake.estimate.features import PLANAR_LIC1, features_of
-from lic_drake.estimate.nearest_neighbours import NearestNeighbours
+from lic_drake.estimate.neighbours import NearestNeighbours
 from lic_drake.estimate.registry import register_estimator
 from lic_drake.paths import models_dir
 from lic_drake.registry import Registry, load_extensions

@@ -1,21 +1,17 @@
 """The interface of success estimators: scikit-learn's, with unclipped values and gradients."""
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from typing import Any, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, ClassifierMixin, clone, is_classifier
+from sklearn.dummy import DummyRegressor
 from sklearn.utils.validation import has_fit_parameter
 
 from lic_drake.errors import EstimateError
-from lic_drake.estimate.rows import (
-    check_queries,
-    check_rows,
-    check_weights,
-    feature_scale,
-    selection_folds,
-)
+from lic_drake.estimate.rows import check_rows, feature_scale
 from lic_drake.types import Vector
 
 
@@ -23,20 +19,19 @@ class SuccessEstimator(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[mis
     """F(s, x0) of paper III-D: an estimate of P(success), with its gradient for Eq. (4).
 
     A binary classifier in scikit-learn's sense, with classes 0 (failure) and 1 (success). A
-    subclass follows scikit-learn's rules for constructor arguments, so that `clone` works, and
-    implements `_fit` and `_values`, whose arguments are validated. It may override
-    `_value_and_gradient` with an exact gradient, and `_settled` if `fit` chooses settings that
-    later rows should not change.
+    subclass follows scikit-learn's rules for constructor arguments and implements `_fit` and
+    `_values`, whose arguments are validated. It may override `_value_and_gradient` with an exact
+    gradient. `_chosen` names those constructor arguments, such as `bandwidth`, that `fit` chooses,
+    as `bandwidth_`, and that later rows should not change.
 
     Attributes:
         gradient_step: Half width of the numerical gradient's central difference, in standard
             deviations of a feature; wide enough for piecewise constant estimates.
-        classes_: 0 and 1.
-        n_features_in_: Number of features d.
         scale_: Standard deviation of each feature, shape (d,).
     """
 
     gradient_step: float = 0.2
+    _chosen: tuple[str, ...] = ()
 
     def fit(
         self,
@@ -56,41 +51,30 @@ class SuccessEstimator(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[mis
         Raises:
             EstimateError: The rows are unusable.
         """
-        X, y = check_rows(X, y)
-        selection_folds(groups, len(y))  # Refuses groups of another length.
-        known = None if groups is None else np.asarray(groups)
-        return self._learn(X, y, known, check_weights(sample_weight, len(y)))
+        return self._learn(*check_rows(X, y, groups, sample_weight))
 
     def conditioned_on(
         self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None
     ) -> Self:
-        """Returns a new estimator fitted to other rows, with the settings that `fit` chose here.
-
-        Raises:
-            EstimateError: Not fitted yet, or the rows are unusable.
-        """
+        """Returns a new estimator fitted to other rows, with the settings that `fit` chose here."""
         self._check_fitted()
-        return self._settled().fit(X, y, sample_weight=sample_weight)
+        chosen = {name: getattr(self, f"{name}_") for name in self._chosen}
+        other = cast(Self, clone(self).set_params(**chosen))
+        return other.fit(X, y, sample_weight=sample_weight)
 
     def values(self, X: ArrayLike) -> Vector:
-        """Returns estimates for queries X, shape (n, d), not clipped to [0, 1]: shape (n,).
+        """Returns estimates for queries X, shape (n, d): shape (n,).
 
-        Clipping would remove the gradient near 0 and 1 and tie the best starts.
+        They are not clipped to [0, 1], which would tie the best starts.
 
         Raises:
             EstimateError: Not fitted yet, or unusable queries.
         """
-        self._check_fitted()
-        return self._values(check_queries(X, self.n_features_in_))
+        return self._values(self._checked(X))
 
     def value_and_gradient(self, x: ArrayLike) -> tuple[float, Vector]:
-        """Returns the unclipped estimate at x, shape (d,), and its gradient, shape (d,).
-
-        Raises:
-            EstimateError: Not fitted yet, or an unusable query.
-        """
-        self._check_fitted()
-        return self._value_and_gradient(check_queries(np.atleast_2d(x), self.n_features_in_)[0])
+        """Returns the unclipped estimate at x, shape (d,), and its gradient, shape (d,)."""
+        return self._value_and_gradient(self._checked(np.atleast_2d(x))[0])
 
     def predict_proba(self, X: ArrayLike) -> Vector:
         """Returns the probabilities of failure and success for queries X, shape (n, 2)."""
@@ -103,25 +87,20 @@ class SuccessEstimator(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[mis
 
     @abstractmethod
     def _fit(self, X: Vector, y: Vector, groups: Any, weight: Vector) -> None:
-        """Fits to validated rows; see `fit`. `groups` is None or an array, shape (n,)."""
+        """Fits to validated rows; see `fit`. `groups` may be None."""
 
     @abstractmethod
     def _values(self, X: Vector) -> Vector:
         """Returns unclipped estimates for validated queries; see `values`."""
 
     def _value_and_gradient(self, x: Vector) -> tuple[float, Vector]:
-        """Returns value and gradient at a validated query, by default by central differences."""
+        """Returns value and gradient at a validated query, here by central differences."""
         h = self.gradient_step * self.scale_
         values = self._values(np.vstack([x, x + np.diag(h), x - np.diag(h)]))
         up, down = np.split(values[1:], 2)
         return float(values[0]), (up - down) / (2.0 * h)
 
-    def _settled(self) -> Self:
-        """Returns an unfitted estimator with the settings that `fit` chose."""
-        return cast(Self, clone(self))
-
     def _learn(self, X: Vector, y: Vector, groups: Any, weight: Vector) -> Self:
-        """Fits to validated rows and returns itself."""
         self._fit(X, y, groups, weight)
         self.classes_ = np.array([0.0, 1.0])
         self.n_features_in_ = X.shape[1]
@@ -132,29 +111,33 @@ class SuccessEstimator(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[mis
         if not hasattr(self, "n_features_in_"):
             raise EstimateError(f"this {type(self).__name__} has no rows yet; call fit(X, y) first")
 
+    def _checked(self, X: ArrayLike) -> Vector:
+        self._check_fitted()
+        X = np.asarray(X, dtype=np.float64)
+        if X.ndim != 2 or X.shape[1] != self.n_features_in_:
+            raise EstimateError(f"queries need shape (n, {self.n_features_in_}), got {X.shape}")
+        if not np.isfinite(X).all():
+            raise EstimateError("queries must be finite, got NaN or infinity; check goal and start")
+        return X
+
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()
         tags.classifier_tags.multi_class = False
         return tags
 
 
-def from_sklearn(model: Any, gradient_step: float = 0.2) -> "SklearnEstimator":
-    """Wraps a scikit-learn classifier or regressor as a success estimator.
+@dataclass(eq=False, repr=False)
+class SklearnEstimator(SuccessEstimator):
+    """A scikit-learn classifier or regressor as a success estimator.
 
-    Args:
+    Attributes:
         model: The unfitted model. A classifier's estimate is its probability of class 1, a
             regressor's its prediction.
         gradient_step: See `SuccessEstimator`; small for a smooth model.
     """
-    return SklearnEstimator(model, gradient_step)
 
-
-class SklearnEstimator(SuccessEstimator):
-    """See `from_sklearn`; `model_` is the fitted clone, None if all outcomes are equal."""
-
-    def __init__(self, model: Any, gradient_step: float = 0.2) -> None:
-        self.model = model
-        self.gradient_step = gradient_step
+    model: Any
+    gradient_step: float = 0.2
 
     def _fit(self, X: Vector, y: Vector, groups: Any, weight: Vector) -> None:
         options = {}
@@ -165,13 +148,15 @@ class SklearnEstimator(SuccessEstimator):
                     " differ; choose a model whose fit takes sample_weight"
                 )
             options["sample_weight"] = weight
-        self._constant = float(y[0])
         alike = bool(np.all(y == y[0]))
-        self.model_ = None if alike else clone(self.model).fit(X, y, **options)
+        model = DummyRegressor() if alike else clone(self.model)
+        self.model_ = model.fit(X, y, **options)
 
     def _values(self, X: Vector) -> Vector:
-        if self.model_ is None:
-            return np.full(len(X), self._constant)
         if is_classifier(self.model_):
             return np.asarray(self.model_.predict_proba(X)[:, 1], dtype=np.float64)
         return np.asarray(self.model_.predict(X), dtype=np.float64)
+
+
+from_sklearn = SklearnEstimator
+"""Wraps a scikit-learn model; see `SklearnEstimator`."""

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,21 +19,12 @@ _IN_SPACE = ("start_x", "start_y", "start_z", "start_qw", "start_qx", "start_qy"
 _START = (*_IN_PLANE, *_IN_SPACE[2:])
 _OBSERVED = tuple(FIRST_PREFIX + name for name in SHOWN)
 
-# Equal offsets computed from different numbers must be one feature value, metres.
-_DECIMALS = 9
+_DECIMALS = 9  # Equal offsets computed from different numbers must be one feature value.
 
 
 @dataclass(frozen=True, kw_only=True)
 class ExperienceRows:
-    """Past reaches as training rows of an estimator.
-
-    Attributes:
-        X: Features, shape (n, d).
-        y: Successes, shape (n,), each 0 or 1.
-        groups: Environment of each reach, shape (n,).
-        weight: Number of simulated reaches that each counts as, shape (n,).
-        simulated: Whether each comes from simulation, shape (n,).
-    """
+    """Past reaches as arguments of `SuccessEstimator.fit`, and whether each was simulated."""
 
     X: Vector
     y: Vector
@@ -50,13 +41,12 @@ class FeatureMap:
     at b0 (base position and torso height): the translation T_b0 of paper Eq. (3).
 
     Attributes:
-        goal: Columns of the goal, some of goal_x, goal_y, goal_z, metres.
-        start: Columns of the initial condition x0: some of start_x, start_y, start_phi, or in space
-            of start_x, start_y, start_z and the quaternion start_qw .. start_qz.
-        observed: Columns of what the first reach observed, for LIC-2: "first_" followed by a name
-            in `lic_drake.experience.pairs.SHOWN`, metres, radians and m/s.
-        relative: Whether the k-th goal column is replaced by the k-th start column minus it.
-            LIC-1 only.
+        goal: Some of goal_x, goal_y, goal_z, metres.
+        start: Of the initial condition x0: some of start_x, start_y, start_phi, or in space of
+            start_x, start_y, start_z and start_qw .. start_qz.
+        observed: For LIC-2, what the first reach observed: "first_" followed by a name in
+            `lic_drake.experience.pairs.SHOWN`, metres, radians and m/s.
+        relative: For LIC-1, whether the k-th start column minus the k-th goal replaces the latter.
     """
 
     goal: tuple[str, ...]
@@ -65,18 +55,13 @@ class FeatureMap:
     relative: bool = False
 
     def __post_init__(self) -> None:
-        for kind, names, known in (
-            ("goal", self.goal, _GOAL),
-            ("start", self.start, _START),
-            ("observed", self.observed, _OBSERVED),
-        ):
-            needed = kind != "observed" and not names
-            if needed or not set(names) <= set(known) or len(set(names)) < len(names):
+        parts = {"goal": _GOAL, "start": _START, "observed": _OBSERVED}
+        for kind, known in parts.items():
+            names = getattr(self, kind)
+            if not set(names) <= set(known) or len(set(names)) < len(names):
                 raise EstimateError(
                     f"{kind} features must be some of {', '.join(known)}, each once, got {names}"
                 )
-        if "start_phi" in self.start and self.in_space:
-            raise EstimateError(f"start features are of the plane or of space, got {self.start}")
         if self.relative and (self.observed or len(self.goal) > len(self.start)):
             raise EstimateError(
                 "relative features need a start column for each goal column and no observed"
@@ -94,13 +79,6 @@ class FeatureMap:
         return self.goal + self.observed + self.start
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the d features."""
-        if not self.relative:
-            return self.columns
-        return tuple(f"{e} - {g}" for e, g in zip(self.start, self.goal, strict=False)) + self.start
-
-    @property
     def situation(self) -> slice:
         """The given part of x."""
         return slice(0, len(self.goal) + len(self.observed))
@@ -116,24 +94,19 @@ class FeatureMap:
         return self._matrix[: len(self.goal)]  # The map to relative features is its own inverse.
 
     def rows(self, columns: Mapping[str, NDArray[Any]]) -> ExperienceRows:
-        """Returns the training rows of a library.
-
-        A reach that diverged or never began counts as a failure, as it does in an evaluation.
+        """Returns the training rows of a library, in which a reach that never began is a failure.
 
         Args:
             columns: Arrays of equal length, named as the fields of `ReachRecord`; with observed
-                features those of `lic_drake.experience.pairs.pair_reaches`. Defaults: 0 for
-                base_x, base_y and torso, 1 for weight, "simulation" for source.
-
-        Raises:
-            EstimateError: A column is missing.
+                features those of `lic_drake.experience.pairs.pair_reaches`. Base, torso, weight
+                and source may be missing: 0, 1 and "simulation".
         """
         needed = (*self.columns, "success", "stream", "environment")
-        missing = [name for name in needed if name not in columns]
-        if missing:
-            raise EstimateError(
-                f"the library has no column {missing[0]!r}; it needs {', '.join(needed)}"
-            )
+        for name in needed:
+            if name not in columns:
+                raise EstimateError(
+                    f"the library has no column {name!r}; it needs {', '.join(needed)}"
+                )
         # Environments of different streams share indices.
         streams, stream = np.unique(columns["stream"].astype(str), return_inverse=True)
         groups = columns["environment"].astype(np.int64) * len(streams) + stream
@@ -153,12 +126,8 @@ class FeatureMap:
 
         Args:
             p_RG: Goal in R, shape (..., 3), metres.
-            x0: Initial condition in R: (x, y, phi), shape (..., 3), or position and quaternion,
-                shape (..., 7), metres and radians.
+            x0: Initial condition in R, shape (..., 3) or (..., 7), see `Start.x0`.
             observed: Observed features, shape (..., k), see `observation`; none by default.
-
-        Raises:
-            EstimateError: The number of observed features is wrong.
         """
         p_RG, x0 = np.asarray(p_RG, dtype=float), np.asarray(x0, dtype=float)
         seen = np.zeros(0) if observed is None else np.asarray(observed, dtype=float)
@@ -177,11 +146,8 @@ class FeatureMap:
 
         Args:
             first: What the first reach observed, in W, by the names in
-                `lic_drake.experience.pairs.SHOWN`, metres, radians and m/s.
+                `lic_drake.experience.pairs.SHOWN`.
             b0: Origin of R in the second reach, shape (..., 3), metres.
-
-        Raises:
-            EstimateError: A value is missing or not finite: the first reach never began.
         """
         seen = [first.get(name.removeprefix(FIRST_PREFIX), np.nan) for name in self.observed]
         if not np.all(np.isfinite(seen)):
@@ -194,20 +160,16 @@ class FeatureMap:
     def gradient_by_x0(self, gradient: Vector) -> Vector:
         """Returns the gradient by x0, shape (3,) or (7,), from that by x, shape (d,)."""
         by_x0 = np.zeros(len(_IN_SPACE if self.in_space else _IN_PLANE))
-        by_x0[self._start_indices] = self._by_columns(gradient)[self.decision]
+        by_x0[self._start_indices] = (self._matrix.T @ gradient)[self.decision]
         return by_x0
 
     def gradient_by_base(self, gradient: Vector) -> Vector:
         """Returns the gradient by b0, shape (3,), with goal, first reach and start fixed in W."""
-        return -(_base_part(self.columns).T @ self._by_columns(gradient))
+        return -(_base_part(self.columns).T @ (self._matrix.T @ gradient))
 
     def _features(self, values: Vector) -> Vector:
         """Returns x from the columns' values in R, both of shape (..., d)."""
         return np.round(values @ self._matrix.T, _DECIMALS) if self.relative else values
-
-    def _by_columns(self, gradient: Vector) -> Vector:
-        """Returns the gradient by the columns from that by x, both of shape (d,)."""
-        return self._matrix.T @ gradient if self.relative else gradient
 
     @cached_property
     def _matrix(self) -> Vector:
@@ -237,15 +199,12 @@ PLANAR_LIC1 = FeatureMap(goal=("goal_x", "goal_y"), start=("start_y", "start_phi
 SPACE_LIC1 = FeatureMap(goal=("goal_y", "goal_z"), start=("start_y", "start_z"), relative=True)
 """LIC-1 in space, where tools point along x.
 
-Success depends mainly on the offset between goal and aperture across x, which a kernel with one
-scale per feature captures only if the offset is itself a feature: the selected start then succeeds
-for 183 instead of 163 of 480 held-out goals (notebooks/results/ablation/space_features.md). Roll is
-not a feature, as the aperture determines it.
+The offset between goal and aperture across x is a feature since success depends mainly on it: see
+notebooks/results/ablation/space_features.md. The aperture determines the roll.
 """
 
 
-@dataclass(frozen=True)
-class CategoryFeatures:
+class CategoryFeatures(NamedTuple):
     """Features of LIC-1 and LIC-2 (paper IV-A); `second` is None where there is no LIC-2."""
 
     first: FeatureMap
@@ -253,11 +212,7 @@ class CategoryFeatures:
 
 
 def features_of(category: str) -> CategoryFeatures:
-    """Returns the features of a category, as it was registered.
-
-    Raises:
-        LicError: The category or one of its features is unknown.
-    """
+    """Returns the features of a registered category."""
     known = get_category(category)
     first = SPACE_LIC1 if known.in_space else PLANAR_LIC1
     if known.observed is None:

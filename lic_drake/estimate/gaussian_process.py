@@ -1,20 +1,18 @@
 """Gaussian-process regression of the success probability (paper III-D).
 
-The kernel is the absolute exponential exp(-sum_i theta_i |d_i|), with the weighted L1 norm (a
-Matern kernel with nu = 1/2 uses the L2 norm). It has a kink wherever a feature equals that of a
-training row. Rows are modelled as y ~ N(mu 1, C) with C = s R(theta) + diag(noise) + tau I, the
-correlation R, a constant mean mu (its generalised-least-squares value), and known noise.
+The kernel is the absolute exponential exp(-sum_i theta_i |d_i|), with a kink wherever a feature
+equals that of a training row. Rows are modelled as y ~ N(mu 1, C) with C = s R(theta) +
+diag(noise) + tau I, the correlation R, the generalised-least-squares mean mu, and known noise.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any, Self, cast
+from typing import Any
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dpotri
 from scipy.optimize import minimize
 from scipy.spatial.distance import cdist
-from sklearn.base import clone
 from threadpoolctl import threadpool_limits
 
 from lic_drake.errors import EstimateError
@@ -41,13 +39,9 @@ _THETA_STARTS = (0.05, 0.3, 1.5)
 
 @dataclass(frozen=True, kw_only=True)
 class Hyperparameters:
-    """Prior and noise of a process.
+    """Prior and noise: theta, shape (d,), is the decay per unit of each feature.
 
-    Attributes:
-        theta: Decay of the correlation per unit of each feature, shape (d,).
-        signal_variance: Prior variance s of the success probability around its mean.
-        noise_floor: Noise variance tau of a row beyond binomial noise.
-        reach_variance: Noise variance of a single reach; a row of n reaches has 1 / n of it.
+    A row of n reaches has the noise variance reach_variance / n + noise_floor (tau).
     """
 
     theta: Vector
@@ -56,22 +50,22 @@ class Hyperparameters:
     reach_variance: float
 
 
+@dataclass(eq=False, repr=False)
 class GaussianProcess(SuccessEstimator):
     """An exact GP with constant mean, L1 kernel and binomial noise, on averaged rows.
 
     Scales, signal variance and noise floor maximise the marginal likelihood, which assumes
-    independent noise. Outcomes in one environment are correlated (one cylinder can block many
-    reaches), and the likelihood would overfit them. The noise is therefore multiplied by the factor
-    (the design effect of cluster sampling) that best predicts held-out environments. Rows of equal
-    features are averaged first, as the paper's software refused duplicate inputs.
+    independent noise and would overfit the correlated outcomes in one environment. The noise is
+    therefore multiplied by the factor (the design effect of cluster sampling) that best predicts
+    held-out environments. Rows of equal features are averaged first, as the paper's software
+    refused duplicate inputs.
 
     Attributes:
-        hyperparameters: Fixed hyper-parameters; None: `fit` chooses them.
-        hyperparameters_: Those in use.
+        hyperparameters: Fixed ones; None: `fit` chooses those in use, `hyperparameters_`.
     """
 
-    def __init__(self, hyperparameters: Hyperparameters | None = None) -> None:
-        self.hyperparameters = hyperparameters
+    hyperparameters: Hyperparameters | None = None
+    _chosen = ("hyperparameters",)
 
     def _fit(self, X: Vector, y: Vector, groups: Any, weight: Vector) -> None:
         rows = average_rows(X, y, weight)
@@ -84,66 +78,41 @@ class GaussianProcess(SuccessEstimator):
         # On a busy machine OpenBLAS threads waiting for each other turned 2 s into minutes.
         with threadpool_limits(limits=1, user_api="blas"):
             if chosen is None:
-                chosen = _choose_hyperparameters(X, y, weight, selection_folds(groups, len(y)))
-            self._posterior = condition(rows, chosen)
+                chosen = _choose_settings(X, y, weight, selection_folds(groups, len(y)))
+            self._posterior = Posterior(rows, chosen)
         self.hyperparameters_ = chosen
-
-    def _settled(self) -> Self:
-        return cast(Self, clone(self).set_params(hyperparameters=self.hyperparameters_))
 
     def _values(self, X: Vector) -> Vector:
         return self._posterior.mean(X)
 
     def _value_and_gradient(self, x: Vector) -> tuple[float, Vector]:
-        return self._posterior.mean_and_gradient(x)
+        # At a kink this is the mean of the one-sided gradients.
+        posterior, theta = self._posterior, self._posterior.prior.theta
+        difference = x - posterior.X
+        correlation = np.exp(-(np.abs(difference) @ theta))
+        slope = -theta * np.sign(difference) * correlation[:, None]
+        weight = posterior.prior.signal_variance * posterior.alpha
+        return float(posterior.prior_mean + weight @ correlation), weight @ slope
 
 
-@dataclass(frozen=True)
 class Posterior:
-    """The process conditioned on m rows.
+    """The process conditioned on m rows: `alpha` is C^-1 (rate - mu), `prior_mean` mu."""
 
-    Attributes:
-        X: Features, shape (m, d).
-        hyperparameters: Prior and noise.
-        prior_mean: Generalised-least-squares mean mu.
-        alpha: C^-1 (rate - mu), shape (m,).
-    """
-
-    X: Vector
-    hyperparameters: Hyperparameters
-    prior_mean: float
-    alpha: Vector
+    def __init__(self, rows: AveragedRows, prior: Hyperparameters) -> None:
+        self.X, self.prior = rows.X, prior
+        covariance = prior.signal_variance * l1_correlation(rows.X, rows.X, prior.theta)
+        noise = prior.reach_variance / rows.count + prior.noise_floor
+        covariance[np.diag_indices(len(rows.X))] += noise
+        factor = cho_factor(covariance, lower=True, overwrite_a=True, check_finite=False)
+        targets = np.column_stack([rows.rate, np.ones(len(rows.rate))])
+        weights = cho_solve(factor, targets, check_finite=False)
+        self.prior_mean = float(weights[:, 0].sum() / weights[:, 1].sum())
+        self.alpha = weights[:, 0] - self.prior_mean * weights[:, 1]
 
     def mean(self, X: Vector) -> Vector:
         """Returns the posterior mean for queries X, shape (n, d): shape (n,)."""
-        correlation = l1_correlation(self.X, X, self.hyperparameters.theta)
-        return self.prior_mean + self.alpha @ (self.hyperparameters.signal_variance * correlation)
-
-    def mean_and_gradient(self, x: Vector) -> tuple[float, Vector]:
-        """Returns the posterior mean at x, shape (d,), and its gradient, shape (d,).
-
-        At a kink this is the mean of the one-sided gradients.
-        """
-        theta = self.hyperparameters.theta
-        difference = x - self.X
-        correlation = np.exp(-(np.abs(difference) @ theta))
-        slope = -theta * np.sign(difference) * correlation[:, None]
-        weight = self.hyperparameters.signal_variance * self.alpha
-        return float(self.prior_mean + weight @ correlation), weight @ slope
-
-
-def condition(rows: AveragedRows, hyperparameters: Hyperparameters) -> Posterior:
-    """Conditions the process on rows of success rates."""
-    correlation = l1_correlation(rows.X, rows.X, hyperparameters.theta)
-    covariance = hyperparameters.signal_variance * correlation
-    noise = hyperparameters.reach_variance / rows.count + hyperparameters.noise_floor
-    covariance[np.diag_indices(len(rows.X))] += noise
-    factor = cho_factor(covariance, lower=True, overwrite_a=True, check_finite=False)
-    targets = np.column_stack([rows.rate, np.ones(len(rows.rate))])
-    weights = cho_solve(factor, targets, check_finite=False)
-    prior_mean = float(weights[:, 0].sum() / weights[:, 1].sum())
-    alpha = weights[:, 0] - prior_mean * weights[:, 1]
-    return Posterior(rows.X, hyperparameters, prior_mean, alpha)
+        correlation = l1_correlation(self.X, X, self.prior.theta)
+        return self.prior_mean + self.alpha @ (self.prior.signal_variance * correlation)
 
 
 def l1_correlation(A: Vector, B: Vector, theta: Vector) -> Vector:
@@ -151,21 +120,13 @@ def l1_correlation(A: Vector, B: Vector, theta: Vector) -> Vector:
     return np.exp(-cdist(A * theta, B * theta, "cityblock"))
 
 
-def coordinate_distances(X: Vector) -> Vector:
-    """Returns |x_i - x_j| of each feature, shape (d, n, n)."""
-    return np.abs(X.T[:, :, None] - X.T[:, None, :])
-
-
 def negative_log_likelihood(
     log_parameters: Vector, distances: Vector, y: Vector, noise_variance: Vector
 ) -> tuple[float, Vector]:
     """Returns -log p(y), up to a constant, and its gradient.
 
-    Args:
-        log_parameters: Logarithms of (theta, s, tau), shape (d + 2,).
-        distances: See `coordinate_distances`, shape (d, n, n).
-        y: Observed rates, shape (n,).
-        noise_variance: Known variance of each rate, shape (n,).
+    The parameters are (theta, s, tau), shape (d + 2,); `distances` |x_i - x_j| of each feature,
+    shape (d, n, n). The rates y have known variances, both of shape (n,).
     """
     parameters = np.exp(log_parameters)
     theta, signal, floor = parameters[:-2], parameters[-2], parameters[-1]
@@ -193,10 +154,9 @@ def negative_log_likelihood(
 
 
 def fit_hyperparameters(rows: AveragedRows, reach_variance: float) -> Hyperparameters:
-    """Maximises the marginal likelihood with L-BFGS-B from several initial guesses.
+    """Maximises the marginal likelihood by L-BFGS-B, from several initial guesses.
 
-    All are tried on at most 300 of the rows; the best result is refined on all of them.
-    `reach_variance` is the noise variance of a single reach.
+    All are tried on up to 300 of the rows; the best result is refined on all of them.
     """
     scale = feature_scale(rows.X)
     X, y, noise = rows.X / scale, rows.rate, reach_variance / rows.count
@@ -210,18 +170,18 @@ def fit_hyperparameters(rows: AveragedRows, reach_variance: float) -> Hyperparam
     few = rng.permutation(len(X))[:_MAX_SEARCH_ROWS]
 
     def improve(start: Vector, part: IntVector) -> tuple[float, Vector]:
+        columns = X[part].T
         result = minimize(
             negative_log_likelihood,
             np.clip(start, *bounds.T),
-            args=(coordinate_distances(X[part]), y[part], noise[part]),
+            args=(np.abs(columns[:, :, None] - columns[:, None, :]), y[part], noise[part]),
             jac=True,
             method="L-BFGS-B",
             bounds=bounds,
         )
         return float(result.fun), np.asarray(result.x)
 
-    found = [improve(start, few) for start in starts]
-    _, best = min(found, key=lambda pair: pair[0])
+    _, best = min((improve(start, few) for start in starts), key=lambda found: found[0])
     if len(few) < len(X):
         _, best = improve(best, np.arange(len(X)))
     return Hyperparameters(
@@ -232,9 +192,7 @@ def fit_hyperparameters(rows: AveragedRows, reach_variance: float) -> Hyperparam
     )
 
 
-def _choose_hyperparameters(
-    X: Vector, y: Vector, weight: Vector, fold: IntVector
-) -> Hyperparameters:
+def _choose_settings(X: Vector, y: Vector, weight: Vector, fold: IntVector) -> Hyperparameters:
     """Returns the likeliest hyper-parameters with the best design effect, from up to 1,000 rows."""
     rows = average_rows(X, y, weight)
     if len(rows.X) > _MAX_SETTINGS_ROWS:
@@ -256,6 +214,6 @@ def _choose_hyperparameters(
         seen = average_rows(X[~out], y[~out], weight[~out])
         unseen = average_rows(X[out], y[out], weight[out])
         for i, candidate in enumerate(candidates):
-            predicted = condition(seen, candidate).mean(unseen.X)
+            predicted = Posterior(seen, candidate).mean(unseen.X)
             error[i] += unseen.count @ (unseen.rate - predicted) ** 2
     return candidates[int(np.argmin(error))]

@@ -11,40 +11,25 @@ if TYPE_CHECKING:  # Listing names must not import scikit-learn, which takes mos
     from lic_drake.estimate.estimator import SuccessEstimator
 
 EstimatorFactory = Callable[[FeatureMap], "SuccessEstimator"]
-"""Returns a new, unfitted estimator for a feature map."""
-
+"""Returns a new, unfitted estimator."""
 _ESTIMATORS: Registry[EstimatorFactory] = Registry("estimator", EstimateError)
-
-_RESERVED = ("rnd", "cost")  # Selection methods without an estimator.
 
 
 def register_estimator(name: str, factory: EstimatorFactory) -> None:
-    """Registers an estimator under a name, which is then also a selection method.
-
-    Args:
-        name: Its name on the command line.
-        factory: Returns a new, unfitted `SuccessEstimator` for a feature map.
-
-    Raises:
-        EstimateError: The name is taken or ambiguous, or `factory` is not callable.
-    """
+    """Registers an estimator under a name, which is then also a selection method."""
     if not callable(factory):
         raise EstimateError(
             f"estimator {name!r} needs a function of a feature map, got {factory!r}; register a"
             " factory, not the estimator"
         )
     twins = (f"{name}1", name[:-1] if name.endswith("1") else None)
-    if name in _RESERVED or any(twin in _ESTIMATORS.entries for twin in twins):
+    if name in ("rnd", "cost") or any(twin in _ESTIMATORS.entries for twin in twins):
         raise EstimateError(f"{name!r} would name two selection methods; choose another name")
     _ESTIMATORS.register(name, factory)
 
 
 def make_estimator(name: str, features: FeatureMap = PLANAR_LIC1) -> "SuccessEstimator":
-    """Returns a new, unfitted estimator for a feature map.
-
-    Raises:
-        EstimateError: The name is unknown, see `estimator_names`.
-    """
+    """Returns a new, unfitted estimator for a feature map."""
     return _ESTIMATORS.get(name)(features)
 
 
@@ -55,23 +40,20 @@ def estimator_names() -> tuple[str, ...]:
 
 def _process(features: FeatureMap) -> "SuccessEstimator":
     """Uses all rows for LIC-1, only the nearest for LIC-2, which has many."""
-    if features.observed:
-        from lic_drake.estimate.local import LocalEstimator, choose_process
-
-        return LocalEstimator(choose_process, features.situation, size=800)
     from lic_drake.estimate.gaussian_process import GaussianProcess
+    from lic_drake.estimate.neighbours import LocalEstimator, choose_process
 
+    if features.observed:
+        return LocalEstimator(choose_process, features.situation, size=800)
     return GaussianProcess()
 
 
 def _neighbours(features: FeatureMap) -> "SuccessEstimator":
     """Uses all rows for LIC-1, only the nearest for LIC-2, which has many."""
+    from lic_drake.estimate.neighbours import LocalEstimator, NearestNeighbours, choose_neighbours
+
     if features.observed:
-        from lic_drake.estimate.local import LocalEstimator, choose_neighbours
-
         return LocalEstimator(choose_neighbours, features.situation, size=2000)
-    from lic_drake.estimate.nearest_neighbours import NearestNeighbours
-
     return NearestNeighbours(held_out=features.goal_matrix if features.relative else None)
 
 

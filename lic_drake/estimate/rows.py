@@ -1,6 +1,7 @@
 """Training rows: validation, averages over equal rows, and cross-validation folds."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,18 +11,20 @@ from lic_drake.seeds import make_generator
 from lic_drake.types import IntVector, Vector
 
 
-def check_rows(X: ArrayLike, y: ArrayLike) -> tuple[Vector, Vector]:
-    """Returns features, shape (n, d), and successes, shape (n,), as arrays of floats.
-
-    Raises:
-        EstimateError: No rows, mismatched lengths, a NaN or infinity, or a y other than 0 or 1.
-    """
-    X = np.asarray(X, dtype=np.float64)
-    y = np.asarray(y, dtype=np.float64)
+def check_rows(
+    X: ArrayLike, y: ArrayLike, groups: ArrayLike | None, sample_weight: ArrayLike | None
+) -> tuple[Vector, Vector, Any, Vector]:
+    """Returns the arguments of `SuccessEstimator.fit` as arrays; weights are 1 by default."""
+    X, y = np.asarray(X, dtype=np.float64), np.asarray(y, dtype=np.float64)
+    weight = np.ones(len(y)) if sample_weight is None else np.asarray(sample_weight, dtype=float)
+    known = None if groups is None else np.asarray(groups)
     if X.ndim != 2 or y.shape != X.shape[:1]:
         raise EstimateError(f"X and y need shapes (n, d) and (n,), got {X.shape} and {y.shape}")
     if X.size == 0:
         raise EstimateError(f"no training rows: X has shape {X.shape}; collect reaches first")
+    for name, given in (("groups", known), ("sample_weight", weight)):
+        if given is not None and given.shape != y.shape:
+            raise EstimateError(f"{name} needs one entry a row ({len(y)}), got {given.shape}")
     unusable = ~np.isfinite(X).all(axis=1)
     if unusable.any():
         raise EstimateError(
@@ -31,38 +34,10 @@ def check_rows(X: ArrayLike, y: ArrayLike) -> tuple[Vector, Vector]:
     wrong = (y != 0.0) & (y != 1.0)
     if wrong.any():
         raise EstimateError(f"successes must be 0 or 1, got {y[wrong][0]} in row {wrong.argmax()}")
-    # Adding zero turns -0.0 into 0.0: rows are compared bit by bit.
-    return X + 0.0, y
-
-
-def check_weights(sample_weight: ArrayLike | None, num_rows: int) -> Vector:
-    """Returns the weight of each row, shape (num_rows,); None means one each.
-
-    Raises:
-        EstimateError: Wrong length, or a weight that is not positive and finite.
-    """
-    if sample_weight is None:
-        return np.ones(num_rows)
-    weight = np.asarray(sample_weight, dtype=np.float64)
-    if weight.shape != (num_rows,):
-        raise EstimateError(f"sample_weight needs one entry a row ({num_rows}), got {weight.shape}")
     if not np.all(np.isfinite(weight) & (weight > 0.0)):
         raise EstimateError(f"weights must be positive numbers, got {np.min(weight)}")
-    return weight
-
-
-def check_queries(X: ArrayLike, num_features: int) -> Vector:
-    """Returns query rows, shape (n, d), as an array of floats.
-
-    Raises:
-        EstimateError: Wrong number of features, or a NaN or infinity.
-    """
-    X = np.asarray(X, dtype=np.float64)
-    if X.ndim != 2 or X.shape[1] != num_features:
-        raise EstimateError(f"queries need shape (n, {num_features}), got {X.shape}")
-    if not np.isfinite(X).all():
-        raise EstimateError("queries must be finite, got NaN or infinity; check goal and start")
-    return X
+    # Adding zero turns -0.0 into 0.0: rows are compared bit by bit.
+    return X + 0.0, y, known, weight
 
 
 def feature_scale(X: Vector) -> Vector:
@@ -74,10 +49,7 @@ def feature_scale(X: Vector) -> Vector:
 
 @dataclass(frozen=True, kw_only=True)
 class AveragedRows:
-    """Distinct feature vectors with their success rates.
-
-    P(success) depends on the (goal, start) pair alone, so rows of the same pair can be merged into
-    one row with a count without loss.
+    """Distinct feature vectors with their success rates, on which alone P(success) depends.
 
     Attributes:
         X: Features, shape (m, d), in lexicographic order.
@@ -109,9 +81,8 @@ def average_rows(X: Vector, y: Vector, weight: Vector | None = None) -> Averaged
 def reach_variance(rows: AveragedRows) -> float:
     """Returns the mean binomial variance p (1 - p) of one reach around its pair's rate.
 
-    This is the pooled within-row variance; a row of n reaches has the noise variance
-    reach_variance / n. Per-row estimates p (1 - p) / n would treat pairs that succeeded every time
-    by luck as the most certain. One pseudo-reach with the overall variance keeps it positive.
+    It is pooled, as p (1 - p) of single pairs would make those that succeeded every time by luck
+    the most certain. One pseudo-reach with the overall variance keeps it positive.
     """
     num_reaches = rows.count.sum()
     total_rate = (rows.count @ rows.rate + 0.5) / (num_reaches + 1.0)
@@ -121,39 +92,18 @@ def reach_variance(rows: AveragedRows) -> float:
 
 
 def group_folds(groups: ArrayLike, max_folds: int) -> IntVector:
-    """Returns the fold of each row, shape (n,), from 0, with no group split between folds.
-
-    Args:
-        groups: Group of each row, shape (n,).
-        max_folds: Number of folds, fewer if there are fewer groups.
-
-    Raises:
-        EstimateError: Fewer than two folds or groups.
-    """
+    """Returns the fold of each row, shape (n,), from 0, with no group split between folds."""
     distinct, index = np.unique(np.asarray(groups), return_inverse=True)
-    if len(distinct) < 2 or max_folds < 2:
-        raise EstimateError(
-            f"cross-validation needs 2 or more groups and folds, got {len(distinct)} and"
-            f" {max_folds}"
-        )
     # Shuffled, so that the order of a grid does not decide which rows share a fold.
     rank = make_generator("training", "folds").permutation(len(distinct))
     return rank[index] % min(max_folds, len(distinct))
 
 
-def selection_folds(groups: ArrayLike | None, num_rows: int, max_folds: int = 5) -> IntVector:
-    """Returns the folds by which an estimator chooses its settings, shape (num_rows,).
+def selection_folds(groups: ArrayLike | None, num_rows: int) -> IntVector:
+    """Returns the up to 5 folds by which an estimator chooses its settings, shape (num_rows,).
 
-    Without groups, or with only one, each row is its own group. A single row is in fold 0.
-
-    Raises:
-        EstimateError: `groups` has the wrong length.
+    Without groups, or with only one, each row is its own group.
     """
-    rows = np.arange(num_rows)
-    if groups is not None:
-        given = np.asarray(groups)
-        if given.shape != (num_rows,):
-            raise EstimateError(f"groups needs one entry a row ({num_rows}), got {given.shape}")
-        if np.any(given != given[0]):
-            rows = given
-    return group_folds(rows, max_folds) if num_rows > 1 else np.zeros(1, dtype=np.intp)
+    if groups is None or len(np.unique(groups)) == 1:
+        groups = np.arange(num_rows)
+    return group_folds(groups, 5)

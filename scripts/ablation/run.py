@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from lic_drake.errors import LicError
 from lic_drake.estimate.estimator import SuccessEstimator
 from lic_drake.estimate.features import ExperienceRows, FeatureMap, features_of
-from lic_drake.estimate.local import LocalEstimator
-from lic_drake.estimate.nearest_neighbours import NearestNeighbours
+from lic_drake.estimate.neighbours import LocalEstimator, NearestNeighbours
 from lic_drake.estimate.registry import make_estimator
 from lic_drake.estimate.rows import feature_scale, group_folds
 from lic_drake.experience.pairs import pair_reaches
@@ -65,7 +64,7 @@ class FixedBandwidth(NearestNeighbours):
 def small_local_neighbours(features: FeatureMap) -> SuccessEstimator:
     """The local neighbours of the registry with a half of the rows."""
     return LocalEstimator(
-        lambda near: NearestNeighbours(neighbours=200, bandwidth=near.length_scale),
+        lambda local: NearestNeighbours(neighbours=200, bandwidth=local.length_scale_),
         features.situation,
         size=1000,
     )

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from lic_drake.estimate.estimator import SuccessEstimator
 from lic_drake.estimate.features import SPACE_LIC1
-from lic_drake.estimate.nearest_neighbours import NearestNeighbours
+from lic_drake.estimate.neighbours import NearestNeighbours
 from lic_drake.estimate.registry import make_estimator
 from lic_drake.evaluate.statistics import count, mcnemar
 from lic_drake.evaluate.table import Table, rate_cells

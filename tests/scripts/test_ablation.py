@@ -96,7 +96,7 @@ class Recalls:
 
     def __init__(self, name: str, features: FeatureMap) -> None:
         self.goal = features.goal_matrix
-        self.start = np.eye(len(features.names))[features.decision][:2]
+        self.start = np.eye(len(features.columns))[features.decision][:2]
 
     def fit(self, X: Vector, y: Vector, groups: Vector) -> "Recalls":
         self.seen = {tuple(row) for row in np.round(X @ self.goal.T, 6)}

@@ -40,7 +40,7 @@ def without_and_with(library: ExperienceLibrary) -> list[dict[str, NDArray[Any]]
 def second(selector: object) -> Vector:
     """LIC-2's estimate after the failure of the added pair."""
     assert isinstance(selector, LicSelector) and selector.second is not None
-    names = selector.second.features.names
+    names = selector.second.features.columns
     known = {"goal_x": 0.6, "goal_y": 0.1, "start_y": 0.2, "start_phi": 1.0}
     known |= {"first_start_y": 0.2, "first_start_phi": 1.0, "first_final_x": 0.1}
     return selector.second.estimator.values([[known.get(name, 0.1) for name in names]])

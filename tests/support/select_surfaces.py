@@ -58,6 +58,6 @@ _RANGES = {
 def random_model(seed: int, features: FeatureMap = PLANAR_LIC1, count: int = 5) -> SuccessModel:
     """A model whose estimate depends on every one of its features."""
     rng = np.random.default_rng(seed)
-    low, high, width = np.array([_RANGES[name.split("_")[-1]] for name in features.names]).T
+    low, high, width = np.array([_RANGES[name.split("_")[-1]] for name in features.columns]).T
     bumps = Bumps(rng.uniform(low, high, (count, len(low))), rng.uniform(0.4, 0.9, count), width)
     return SuccessModel(estimator=bumps, features=features)
