@@ -35,7 +35,7 @@ from pydrake.systems.sensors import CameraInfo, ImageDepth32F, ImageRgba8U, Rgbd
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import RenderingError
 from lic_drake.perception.config import CameraConfig, CamerasConfig
-from lic_drake.perception.image import CameraImage
+from lic_drake.perception.image import CameraImage, disturbed_image
 from lic_drake.robots.pr2 import HEAD_CAMERA, RIGHT_ARM_AT_REST, make_pr2
 from lic_drake.scene.scene import Scene, SceneConfig, add_scene
 from lic_drake.types import Vector
@@ -46,10 +46,8 @@ RENDERER = "vtk"
 PACKAGES = "libegl1 libgl1 libgl1-mesa-dri"
 """Debian packages that the renderer needs."""
 
-BALL_COLOR = np.array([0.95, 0.80, 0.05, 1.0])
-"""Colour of the goal, RGBA."""
-FLOOR_COLOR = np.array([0.62, 0.62, 0.64, 1.0])
-"""Colour of the floor, RGBA."""
+BALL_COLOR, FLOOR_COLOR = np.array([[0.95, 0.80, 0.05, 1.0], [0.62, 0.62, 0.64, 1.0]])
+"""RGBA."""
 
 _CLIPPING_M = (0.02, 20.0)
 # A ceiling lamp, and some light from the camera.
@@ -77,18 +75,35 @@ def make_renderer(lights: Sequence[LightParameter] = _ROOM) -> RenderEngine:
         ) from None
 
 
-class CameraRig(NamedTuple):
-    """A scene with an observing PR2, and its cameras, in a diagram.
+class Views(NamedTuple):
+    """Images of the PR2's head camera, and of the external one that sees the goal."""
 
-    Attributes:
-        scene: Mobile robot and environment.
-        head: The sensor on the robot's head.
-        external: The sensor that sees the goal.
-    """
+    head: CameraImage
+    external: CameraImage
 
-    scene: Scene
-    head: RgbdSensor
-    external: RgbdSensor
+
+def take_views(instance: ClutterInstance, p_WG: Vector, cameras: CamerasConfig) -> Views:
+    """Returns exact images of an environment, before the robot reaches; see `add_cameras`."""
+    builder = DiagramBuilder()
+    _, head, external = add_cameras(builder, instance, p_WG, cameras)
+    diagram = builder.Build()
+    root = diagram.CreateDefaultContext()
+    return Views(
+        _take(head, cameras.head.camera, root), _take(external, cameras.external.camera, root)
+    )
+
+
+def disturbed_views(
+    views: Views,
+    cameras: CamerasConfig,
+    head_rng: np.random.Generator,
+    external_rng: np.random.Generator,
+) -> Views:
+    """Returns both images with the cameras' errors; the sources may be the same."""
+    return Views(
+        disturbed_image(views.head, cameras.head.camera, head_rng),
+        disturbed_image(views.external, cameras.external.camera, external_rng),
+    )
 
 
 def add_cameras(
@@ -97,7 +112,7 @@ def add_cameras(
     p_WG: Vector,
     cameras: CamerasConfig,
     ahead: bool = False,
-) -> CameraRig:
+) -> tuple[Scene, RgbdSensor, RgbdSensor]:
     """Adds an environment, a ball at the goal, a PR2 that observes it, and the cameras.
 
     In the default context the robot stands where it looks from, its right arm at its side.
@@ -108,6 +123,9 @@ def add_cameras(
         p_WG: The goal, shape (3,), metres.
         cameras: The cameras.
         ahead: Whether the robot faces along x instead of where it looks.
+
+    Returns:
+        The scene, the sensor on the robot's head and the external one, which sees the goal.
 
     Raises:
         RenderingError: The renderer does not work on this machine.
@@ -126,36 +144,34 @@ def add_cameras(
     b0 = np.array([x, y, head.torso_m])
     plant.SetDefaultPositions(scene.arm, robot.positions(b0, RIGHT_ARM_AT_REST))
     X_WC = look_at(external.p_WC, external.target)
-    return CameraRig(
-        scene=scene,
-        head=add_camera(
-            builder, scene_graph, "head", head.camera, mount.GetFixedPoseInBodyFrame(), parent
-        ),
-        external=add_camera(builder, scene_graph, "external", external.camera, X_WC),
-    )
-
-
-def camera_image(
-    rgba: ImageRgba8U, depth_image: ImageDepth32F, X_WC: RigidTransform, focal_px: float
-) -> CameraImage:
-    """Returns the images of an `RgbdSensor` and the pose they are taken from as plain arrays."""
-    # Copies: what Drake returns may be a view of its own memory.
-    color = np.array(np.asarray(rgba.data)[..., :3])
-    depth = np.array(np.asarray(depth_image.data)[..., 0], dtype=np.float64)
-    depth[~np.isfinite(depth) | (depth <= 0.0)] = np.nan
-    return CameraImage(
-        color=color,
-        depth=depth,
-        focal_px=focal_px,
-        R_WC=np.array(X_WC.rotation().matrix()),
-        p_WC=np.array(X_WC.translation()),
+    X_PC = mount.GetFixedPoseInBodyFrame()
+    return (
+        scene,
+        add_camera(builder, scene_graph, "head", head.camera, X_PC, parent),
+        add_camera(builder, scene_graph, "external", external.camera, X_WC),
     )
 
 
 def take_color_image(sensor: RgbdSensor, root: Context) -> NDArray[np.uint8]:
     """Returns the colours that a sensor sees, shape (height, width, 3), without rendering depth."""
     rgba = sensor.color_image_output_port().Eval(sensor.GetMyContextFromRoot(root))
+    # A copy: what Drake returns may be a view of its own memory.
     return np.array(np.asarray(cast(ImageRgba8U, rgba).data)[..., :3])
+
+
+def _take(sensor: RgbdSensor, config: CameraConfig, root: Context) -> CameraImage:
+    context = sensor.GetMyContextFromRoot(root)
+    measured = cast(ImageDepth32F, sensor.depth_image_32F_output_port().Eval(context))
+    X_WC = cast(RigidTransform, sensor.body_pose_in_world_output_port().Eval(context))
+    depth = np.array(np.asarray(measured.data)[..., 0], dtype=np.float64)
+    depth[~np.isfinite(depth) | (depth <= 0.0)] = np.nan
+    return CameraImage(
+        color=take_color_image(sensor, root),
+        depth=depth,
+        focal_px=config.focal_px,
+        R_WC=np.array(X_WC.rotation().matrix()),
+        p_WC=np.array(X_WC.translation()),
+    )
 
 
 def add_camera(
@@ -166,11 +182,11 @@ def add_camera(
     X_PC: RigidTransform,
     parent: FrameId | None = None,
 ) -> RgbdSensor:
-    """Adds a sensor.
+    """Adds a sensor to a scene graph with a renderer named `RENDERER`.
 
     Args:
         builder: Gets the sensor.
-        scene_graph: Has a renderer named `RENDERER`.
+        scene_graph: The scene graph.
         name: Name of the system.
         config: Size, focal length and range.
         X_PC: Pose of the camera, its z axis forward, in its parent frame.
@@ -205,12 +221,7 @@ def add_prop(scene_graph: SceneGraph, name: str, shape: Shape, p_WO: Vector, col
 
 
 def look_at(p_WC: Sequence[float], target: Sequence[float]) -> RigidTransform:
-    """Returns X_WC of a camera that looks at a point, its x axis level.
-
-    Args:
-        p_WC: Where the camera is, (x, y, z), metres.
-        target: What it looks at, not directly above or below it, (x, y, z), metres.
-    """
+    """Returns X_WC, its x axis level, of a camera at p_WC that looks at a point, metres."""
     z = np.subtract(target, p_WC)
     z /= np.linalg.norm(z)
     x = np.cross(z, [0.0, 0.0, 1.0])

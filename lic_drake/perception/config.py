@@ -9,9 +9,6 @@ from lic_drake.config import check_numbers, read_mapping, read_section
 from lic_drake.errors import ScenarioError
 from lic_drake.paths import models_dir
 
-PIXELS = (16, 4096)
-"""Least and greatest number of columns or rows of an image."""
-
 
 @dataclass(kw_only=True)
 class NoiseConfig:
@@ -69,7 +66,7 @@ class CameraConfig:
         check_numbers(
             self,
             positive=("focal_px", "nearest_m"),
-            ranges={"width": PIXELS, "height": PIXELS, "furthest_m": (beyond, 1000.0)},
+            ranges={"width": (16, 4096), "height": (16, 4096), "furthest_m": (beyond, 1000.0)},
         )
 
 

@@ -5,24 +5,19 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 from skimage.color import rgb2hsv
-from skimage.measure import label, regionprops
+from skimage.measure import label
 
 from lic_drake.errors import PerceptionError
 from lic_drake.perception.config import CameraConfig
-from lic_drake.perception.image import CameraImage
-from lic_drake.perception.noise import pose_covariance
+from lic_drake.perception.image import CameraImage, pose_covariance
 from lic_drake.types import Vector
 
 YELLOW_HUE = (0.105, 0.19)
 """Range of hues of the ball (orange to greenish yellow), 0 to 1."""
-YELLOW_SATURATION = 0.6
-"""Least saturation of the ball, 0 to 1."""
-YELLOW_VALUE = 0.25
-"""Least brightness of the ball, 0 to 1."""
-
+YELLOW_SATURATION, YELLOW_VALUE = 0.6, 0.25
+"""Least saturation and brightness of the ball, 0 to 1."""
 MIN_PIXELS = 20
 """Minimum number of pixels of the ball."""
-
 RIM = 0.2
 """Rays that enter the ball by less than this share of radius^2 are left out of the covariance."""
 
@@ -59,15 +54,14 @@ def find_goal(image: CameraImage, camera: CameraConfig, ball_radius_m: float) ->
     yellow = (hue > YELLOW_HUE[0]) & (hue < YELLOW_HUE[1])
     yellow &= (saturation > YELLOW_SATURATION) & (value > YELLOW_VALUE)
     spots = label(yellow)  # type: ignore[no-untyped-call]
-    regions = regionprops(spots)  # type: ignore[no-untyped-call]
-    largest = max(regions, key=lambda region: region.area, default=None)
-    num_pixels = 0 if largest is None else int(largest.area)
-    if largest is None or num_pixels < MIN_PIXELS:
+    num_pixels = np.bincount(spots[yellow], minlength=1)
+    largest = int(np.argmax(num_pixels))
+    if num_pixels[largest] < MIN_PIXELS:
         raise PerceptionError(
-            f"no yellow ball in view: the largest yellow spot has {num_pixels} pixels, at least"
-            f" {MIN_PIXELS} are needed; turn or move the external camera"
+            f"no yellow ball in view: the largest yellow spot has {num_pixels[largest]} pixels, at"
+            f" least {MIN_PIXELS} are needed; turn or move the external camera"
         )
-    shown = (spots == largest.label) & np.isfinite(image.depth)
+    shown = (spots == largest) & np.isfinite(image.depth)
     depth, rays = image.depth[shown], image.rays()[shown]
     if len(depth) < MIN_PIXELS:
         raise PerceptionError(
@@ -80,7 +74,7 @@ def find_goal(image: CameraImage, camera: CameraConfig, ball_radius_m: float) ->
         p_WG=p_WG,
         covariance=image.R_WC @ covariance @ image.R_WC.T
         + pose_covariance(p_WG - image.p_WC, camera.pose_error),
-        num_pixels=num_pixels,
+        num_pixels=int(num_pixels[largest]),
     )
 
 

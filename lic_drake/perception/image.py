@@ -1,11 +1,21 @@
-"""`CameraImage`: colours and depths, and the pose that the robot believes its camera to have."""
+"""Images of depth cameras, and the cameras' errors.
 
-from dataclasses import dataclass
+The random error of a depth and the step in which depths come grow with the depth squared, because
+such cameras measure disparities: Khoshelham and Elberink, "Accuracy and resolution of Kinect depth
+data", Sensors 12 (2012).
+"""
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter, minimum_filter
+from scipy.spatial.transform import Rotation
 
+from lic_drake.perception.config import CameraConfig, NoiseConfig, PoseErrorConfig
 from lic_drake.types import Vector
+
+_FAR_M = 1e6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,19 +53,61 @@ class CameraImage:
         return np.stack([u, v, np.ones_like(u)], axis=-1)
 
     def project(self, p_WQ: Vector) -> Vector:
-        """Returns where points in front of the camera appear: (column, row), shape (.., 2), pixels.
-
-        Args:
-            p_WQ: The points, shape (.., 3), metres.
-        """
+        """Returns where points (.., 3) before the camera appear: (column, row), shape (.., 2)."""
         return self.project_from_camera((p_WQ - self.p_WC) @ self.R_WC)
 
     def project_from_camera(self, p_CQ: Vector) -> Vector:
-        """Returns where points appear, (column, row), shape (.., 2), pixels.
-
-        Args:
-            p_CQ: Points in the camera's frame, shape (.., 3), metres.
-        """
+        """Returns where points (.., 3) in the camera's frame appear, as `project` does."""
         height, width = self.shape
         centre = np.array([0.5 * width - 0.5, 0.5 * height - 0.5])
         return np.asarray(self.focal_px * p_CQ[..., :2] / p_CQ[..., 2:] + centre)
+
+
+def add_depth_noise(depth: Vector, config: NoiseConfig, rng: np.random.Generator) -> Vector:
+    """Returns what a depth camera would measure.
+
+    Args:
+        depth: True depths along the optical axis, shape (height, width), metres; NaN where there
+            is none.
+        config: The errors.
+        rng: Source of the draws.
+    """
+    disparity = 1.0 / depth
+    disparity += config.depth_sigma_per_m * rng.standard_normal(depth.shape)
+    if config.depth_step_per_m > 0.0:
+        # The step of the disparity 1/z is uniform.
+        disparity = config.depth_step_per_m * np.round(disparity / config.depth_step_per_m)
+    known = np.nan_to_num(depth, nan=_FAR_M)
+    jump = maximum_filter(known, 3) - minimum_filter(known, 3) > config.jump_m
+    lost = rng.random(depth.shape) < np.where(jump, config.edge_dropout, config.dropout)
+    return np.where(lost | ~(disparity > 0.0), np.nan, 1.0 / np.abs(disparity))
+
+
+def disturbed_image(
+    image: CameraImage, config: CameraConfig, rng: np.random.Generator
+) -> CameraImage:
+    """Returns an exact image with errors of its pixels and of its camera's believed pose."""
+    error = config.pose_error
+    R = Rotation.from_rotvec(np.deg2rad(error.rotation_deg) * rng.standard_normal(3)).as_matrix()
+    p = error.translation_m * rng.standard_normal(3)
+    color = image.color + config.noise.color_sigma * rng.standard_normal(image.color.shape)
+    return replace(
+        image,
+        color=np.clip(np.round(color), 0, 255).astype(np.uint8),
+        depth=add_depth_noise(image.depth, config.noise, rng),
+        R_WC=image.R_WC @ R,
+        p_WC=image.p_WC + image.R_WC @ p,
+    )
+
+
+def pose_covariance(p_CQ_W: Vector, config: PoseErrorConfig) -> Vector:
+    """Returns the covariance of a point by the errors of the camera's pose, shape (3, 3), m^2.
+
+    Args:
+        p_CQ_W: The point relative to the camera, in W, shape (3,), metres.
+        config: The errors, the same along all axes.
+    """
+    x, y, z = p_CQ_W
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    angle = np.deg2rad(config.rotation_deg)
+    return np.asarray(config.translation_m**2 * np.eye(3) + angle**2 * cross @ cross.T)

@@ -1,15 +1,17 @@
 """The robot's belief about board, apertures and goal before each attempt, from its cameras."""
 
 from dataclasses import dataclass, field, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lic_drake.clutter.board import ApertureBoard
 from lic_drake.errors import PerceptionError, ScenarioError
-from lic_drake.perception.camera_station import CameraStation, Look
+from lic_drake.perception.apertures import DetectedApertures, find_apertures
+from lic_drake.perception.cameras import Views, disturbed_views, take_views
 from lic_drake.perception.config import CamerasConfig
+from lic_drake.perception.goal import DetectedGoal, find_goal
+from lic_drake.perception.image import CameraImage
 from lic_drake.reach.request import ReachRecord
 from lic_drake.reach.scenario import Scenario
 from lic_drake.seeds import make_generator
@@ -18,6 +20,23 @@ from lic_drake.types import Vector
 
 LEAST_PROBABILITY = 0.5
 """Apertures whose probability of being open is lower are treated as blocked."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Look:
+    """What the robot saw, with the cameras' errors, and detected.
+
+    Attributes:
+        head: The image from the PR2's head, in which it detected the apertures.
+        external: The image from the other camera, in which it detected the goal.
+        apertures: The apertures.
+        goal: The goal.
+    """
+
+    head: CameraImage
+    external: CameraImage
+    apertures: DetectedApertures
+    goal: DetectedGoal
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +64,9 @@ class Belief:
 
 @dataclass(kw_only=True)
 class Observer:
-    """Observes one environment before every attempt and caches its beliefs.
+    """A PR2 that observes one environment before every attempt, and caches its beliefs.
+
+    Images are rendered once; each look has its own errors.
 
     Attributes:
         scenario: The scenario.
@@ -62,7 +83,7 @@ class Observer:
     p_WG: Vector
     cameras: CamerasConfig
     moves: bool = True
-    _station: CameraStation | None = field(default=None, init=False, repr=False)
+    _views: Views | None = field(default=None, init=False, repr=False)
     _beliefs: dict[int, Belief] = field(default_factory=dict, init=False, repr=False)
 
     def __call__(self, number: int) -> tuple[Vector, FeasibleStarts]:
@@ -78,17 +99,25 @@ class Observer:
             PerceptionError: The board or the ball is not in view, or no aperture looks open.
         """
         if number not in self._beliefs:
-            if self._station is None:
-                self._station = CameraStation(
-                    self.scenario.sample_instance(self.stream, self.environment),
-                    self.p_WG,
-                    self.cameras,
-                    board_of(self.scenario),
-                    partial(make_generator, self.stream, "camera errors", self.environment),
-                )
-            look = self._station.look(number)
-            self._beliefs[number] = estimate_board(self.scenario, look, self.moves)
+            self._beliefs[number] = estimate_board(self.scenario, self._look(number), self.moves)
         return self._beliefs[number]
+
+    def _look(self, number: int) -> Look:
+        scenario, cameras, at = self.scenario, self.cameras, (self.stream, self.environment)
+        if self._views is None:
+            self._views = take_views(scenario.sample_instance(*at), self.p_WG, cameras)
+        rngs = (
+            make_generator(self.stream, "camera errors", self.environment, 2 * number + camera)
+            for camera in (0, 1)
+        )
+        views = disturbed_views(self._views, cameras, *rngs)
+        board, head, external = board_of(scenario), cameras.head, cameras.external
+        return Look(
+            head=views.head,
+            external=views.external,
+            apertures=find_apertures(views.head, head.camera, board),
+            goal=find_goal(views.external, external.camera, cameras.ball_radius_m),
+        )
 
     def touches_ball(self, record: ReachRecord) -> bool:
         """Returns whether a reach that came to its believed goal ended inside the ball."""
@@ -110,15 +139,10 @@ def board_of(scenario: Scenario) -> ApertureBoard:
 
 
 def estimate_board(scenario: Scenario, look: Look, moves: bool = True) -> Belief:
-    """Returns the belief after a look.
+    """Returns the belief after a look; base and torso may move if `moves`.
 
     The robot knows the size of the board and of its bars, and that the board is upright and
     perpendicular to x; where the board is, and what is open, it has seen.
-
-    Args:
-        scenario: Gives the size of the board, the robot, and where base and torso may be.
-        look: What was seen.
-        moves: Whether base and torso may move.
 
     Raises:
         PerceptionError: No aperture looks open, or the board is at an impossible place.

@@ -33,14 +33,14 @@ def film_frames(trial: ShownTrial, cameras: CamerasConfig) -> Iterator[NDArray[n
         RenderingError: Cameras cannot be simulated on this machine.
     """
     builder = DiagramBuilder()
-    rig = add_cameras(builder, trial.instance, trial.p_WG, cameras, ahead=True)
+    scene, *sensors = add_cameras(builder, trial.instance, trial.p_WG, cameras, ahead=True)
     diagram = builder.Build()
     context = diagram.CreateDefaultContext()
     step = max(1, round(trial.scenario.mpc.rate_hz / FRAMES_PER_SECOND))
     for trace in trial.traces:
         for state in trace.states[::step]:
-            place(rig.scene, context, trace.p_WR, state.q, state)
-            views = [take_color_image(sensor, context) for sensor in (rig.head, rig.external)]
+            place(scene, context, trace.p_WR, state.q, state)
+            views = [take_color_image(sensor, context) for sensor in sensors]
             yield np.hstack(views)[::SHRINK, ::SHRINK]
 
 

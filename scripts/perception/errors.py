@@ -11,13 +11,13 @@ from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import PerceptionError
 from lic_drake.intervals import wilson_interval
 from lic_drake.perception.apertures import STATES, find_apertures
+from lic_drake.perception.cameras import Views, disturbed_views, take_views
 from lic_drake.perception.config import CamerasConfig
 from lic_drake.perception.goal import find_goal
 from lic_drake.perception.observer import board_of
 from lic_drake.reach.scenario import Scenario
 from lic_drake.seeds import make_generator
 from lic_drake.types import Vector
-from scripts.perception.views import Views, disturbed_views, take_views
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,7 +90,8 @@ def measure_scene(
     instance = scenario.sample_instance("evaluation", scene)
     p_WG = scenario.sample_goal("evaluation", scene)
     exact = take_views(instance, p_WG, cameras)
-    noisy = disturbed_views(exact, cameras, make_generator("evaluation", "camera errors", scene))
+    rng = make_generator("evaluation", "camera errors", scene)
+    noisy = disturbed_views(exact, cameras, rng, rng)
     apertures, goals = [], []
     for noise, views in ((False, exact), (True, noisy)):
         apertures += _aperture_errors(scenario, instance, cameras, views, scene, noise)

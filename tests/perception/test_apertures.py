@@ -10,8 +10,7 @@ from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import PerceptionError
 from lic_drake.perception.apertures import DetectedApertures, find_apertures
 from lic_drake.perception.config import CameraConfig, PoseErrorConfig
-from lic_drake.perception.image import CameraImage
-from lic_drake.perception.noise import disturbed_image
+from lic_drake.perception.image import CameraImage, disturbed_image
 from lic_drake.seeds import make_generator
 from scripts.perception.errors import true_states
 

@@ -12,10 +12,10 @@ from support.ray_casting import blank, draw_ball, draw_instance, tilted
 
 from lic_drake.clutter.foliage import FoliageApertureClutter
 from lic_drake.perception.apertures import find_apertures
+from lic_drake.perception.cameras import Views, take_views
 from lic_drake.perception.config import CameraConfig, CamerasConfig, ExternalConfig, HeadConfig
 from lic_drake.perception.goal import find_goal
 from lic_drake.seeds import make_generator
-from scripts.perception.views import Views, take_views
 
 CAMERA = CameraConfig(width=320, height=240, focal_px=262.5)
 CAMERAS = CamerasConfig(head=HeadConfig(camera=CAMERA), external=ExternalConfig(camera=CAMERA))

@@ -7,8 +7,7 @@ from support.ray_casting import OTHER, blank, draw_ball, draw_boxes, tilted
 from lic_drake.errors import PerceptionError
 from lic_drake.perception.config import CameraConfig, PoseErrorConfig
 from lic_drake.perception.goal import find_goal
-from lic_drake.perception.image import CameraImage
-from lic_drake.perception.noise import disturbed_image
+from lic_drake.perception.image import CameraImage, disturbed_image
 
 RADIUS = 0.03
 R_WC, P_WC = tilted(25.0, 140.0), np.array([2.1, -0.9, 1.5])

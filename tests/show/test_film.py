@@ -5,13 +5,13 @@ import pytest
 from PIL import Image
 
 from lic_drake.errors import LicError
+from lic_drake.perception.cameras import take_views
 from lic_drake.perception.config import CameraConfig, CamerasConfig, ExternalConfig, HeadConfig
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.trace import ReachTrace, SceneState
 from lic_drake.robots.pr2 import RIGHT_ARM_AT_REST
 from lic_drake.show.figures import ShownTrial
 from lic_drake.show.film import SHRINK, film_frames, save_film
-from scripts.perception.views import take_views
 
 
 @pytest.mark.usefixtures("_renderer")
