@@ -17,7 +17,7 @@ from lic_drake.show.film import SHRINK, film_frames, save_film
 @pytest.mark.usefixtures("_renderer")
 def test_a_film_shows_what_the_cameras_see_from_where_the_robot_is() -> None:
     camera = CameraConfig(width=320, height=240, focal_px=262.5)
-    head = HeadConfig(camera=camera, base_pose=[-1.0, -0.29, 0.0])
+    head = HeadConfig(camera=camera)
     cameras = CamerasConfig(head=head, external=ExternalConfig(camera=camera))
     scenario = load_scenario(
         "foliage-aperture-clutter", "{clutter: {num_stems: 2, num_branches: 1}}"
