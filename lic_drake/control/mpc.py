@@ -8,42 +8,134 @@ Jacobians J_i, a change dphi of the equilibrium angles changes joint angles, tip
     dx     = J_E S dphi
     df_i   = k_c n_i' J_i S dphi
 
-The problem's terms follow gt-ros-pkg/hrl-haptic-manip (facts only). No Drake here.
-
-The cost terms differ by six orders of magnitude, at which interior-point solvers with absolute
-tolerances fail (Drake's Clarabel: "InsufficientProgress" in thousands of steps of the 100 Hz
-preset). The active-set solver DAQP is exact: Arnstrom, Bemporad and Axehill, A Dual Active-Set
-Solver for Embedded Quadratic Programming Using Recursive LDL' Updates, IEEE TAC 2022.
+The problem's terms follow gt-ros-pkg/hrl-haptic-manip (facts only). No Drake here: the cost terms
+differ by six orders of magnitude, at which interior-point solvers with absolute tolerances fail
+(Clarabel in thousands of steps of the 100 Hz preset). The active-set solver DAQP is exact:
+Arnstrom, Bemporad and Axehill, A Dual Active-Set Solver for Embedded Quadratic Programming Using
+Recursive LDL' Updates, IEEE TAC 2022.
 """
 
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import daqp
 import numpy as np
 from scipy.linalg.lapack import dposv
 
-from lic_drake.control.mpc_config import MpcConfig
+from lic_drake.config import check_numbers
 from lic_drake.types import Vector
 
-PRIMAL_TOLERANCE = 1e-10
-"""Maximum constraint violation, in the rows' units over their length."""
 
-OPTIMAL, INFEASIBLE = 1, -1
-"""DAQP's exit flags."""
+@dataclass(kw_only=True)
+class MpcConfig:
+    """Parameters of the controller; SI units, angles in degrees where named so.
+
+    Source: gt-ros-pkg/hrl-haptic-manip (facts only). Infinite values switch a limit off.
+    """
+
+    rate_hz: float = 25.0
+    # Contact forces up to this threshold are acceptable, N (paper V-A: 5 N in 2-D, 3 N in 3-D).
+    force_threshold_N: float = 5.0
+    # Taxel forces up to this value are ignored, N.
+    force_trim_N: float = 1.0
+    # Assumed stiffness of every contact, N/m.
+    contact_stiffness_N_per_m: float = 1000.0
+    # Desired tip motion per step, m; proportional to the distance once the goal is nearer than
+    # `slow_distance_m` (0: the remaining error if it is smaller than the step).
+    tip_step_m: float = 0.02
+    slow_distance_m: float = 0.1
+    # Weights: tip position; squared joint torque change ("jerk"); force over the threshold.
+    position_weight: float = 1.0
+    torque_change_weight: float = 1e-4
+    force_weight: float = 0.005
+    # Whether the force term is divided by the number of contacts over the threshold.
+    force_weight_shared: bool = True
+    # Desired decrease of a force over the threshold, N per step.
+    force_decrease_N: float = 0.1
+    # Limits of the predicted force change per step, N, below and over the threshold.
+    rise_below_N: float = 0.1
+    fall_below_N: float = np.inf
+    rise_over_N: float = 0.0
+    fall_over_N: float = 10.0
+    # Limits of the equilibrium angles, degrees: change per step, distance from the joint angles
+    # ("wind-up"), distance to which they are reset.
+    max_change_deg: float = 0.5
+    max_windup_deg: float = 30.0
+    reset_windup_deg: float = 45.0
+    # Whether the equilibrium angles, too, must satisfy the joint limits, and whether a joint beyond
+    # its limit may stay there (else it must return in one step).
+    equilibrium_in_limits: bool = True
+    forgive_joint_limits: bool = True
+    # Distance to the goal within which the tip is not moved, m.
+    deadzone_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        # Limits may be infinite, and a negative rise is a required decrease. The weight on torque
+        # changes makes the solution unique.
+        limits = "fall_below_N fall_over_N max_change_deg max_windup_deg reset_windup_deg".split()
+        positive = "force_threshold_N contact_stiffness_N_per_m tip_step_m torque_change_weight"
+        rest = "force_trim_N slow_distance_m position_weight force_weight force_decrease_N"
+        ranges = dict.fromkeys(limits, (0.0, np.inf)) | {"rate_hz": (1.0, 1000.0)}
+        ranges |= dict.fromkeys(("rise_below_N", "rise_over_N"), (-np.inf, np.inf))
+        check_numbers(
+            self,
+            positive=positive.split(),
+            non_negative=[*rest.split(), "deadzone_m"],
+            ranges=ranges,
+        )
+
+    @property
+    def period_s(self) -> float:
+        """Control period, seconds."""
+        return 1.0 / self.rate_hz
+
+
+PRESETS: dict[str, Callable[[], MpcConfig]] = {
+    "haptic_mpc_2013": MpcConfig,
+    "ijrr_2013": partial(
+        MpcConfig,
+        rate_hz=100.0,
+        force_trim_N=0.5,
+        tip_step_m=0.0005,
+        slow_distance_m=0.0,
+        torque_change_weight=1e-5,
+        force_weight=1.0,
+        force_weight_shared=False,
+        force_decrease_N=0.2,
+        fall_below_N=0.1,
+        rise_over_N=-0.01,
+        max_change_deg=np.inf,
+        max_windup_deg=np.inf,
+        reset_windup_deg=np.inf,
+        equilibrium_in_limits=False,
+        forgive_joint_limits=False,
+    ),
+    "pr2": partial(
+        MpcConfig,
+        force_threshold_N=3.0,
+        contact_stiffness_N_per_m=200.0,
+        slow_distance_m=0.25,
+        max_windup_deg=20.0,
+        reset_windup_deg=30.0,
+        deadzone_m=0.01,
+    ),
+}
+"""The published parameter sets by name.
+
+haptic_mpc_2013 is the later controller, 25 Hz, up to 0.5 m/s (hrl_haptic_mpc, simulated 3 links);
+ijrr_2013 the one of the paper's reference [1], 100 Hz, 0.05 m/s; pr2 the later one with its values
+for the PR2 (3 N: paper V-A).
+"""
 
 
 class MpcInput(NamedTuple):
-    """State and contacts at a step; m joints, n contacts, all vectors in R.
+    """State and contacts at a step, all vectors in R.
 
-    Attributes:
-        q: Joint angles theta, shape (m,), radians.
-        q_d: Equilibrium angles phi, shape (m,), radians.
-        p_EG: Vector from tip to goal, shape (3,), metres.
-        Jv_E: Translational Jacobian of the tip, shape (3, m).
-        normals: Outward unit normals of the loaded taxels, shape (n, 3).
-        forces: Their normal forces, shape (n,), N, compression positive.
-        Jv_C: Their translational Jacobians, shape (n, 3, m).
+    Joint angles theta and equilibrium angles phi, shape (m,); vector from tip to goal and the tip's
+    translational Jacobian; outward normals, compressing forces and Jacobians of n loaded taxels.
     """
 
     q: Vector
@@ -56,13 +148,7 @@ class MpcInput(NamedTuple):
 
 
 class Prediction(NamedTuple):
-    """Linear maps from dphi to the effects of a step.
-
-    Attributes:
-        joint: S, shape (m, m).
-        tip: J_E S, shape (3, m), m/rad.
-        force: Rows df_i / dphi, shape (n, m), N/rad.
-    """
+    """Linear maps from dphi to joints, S, shape (m, m); tip, J_E S; and forces, shape (n, m)."""
 
     joint: Vector
     tip: Vector
@@ -72,8 +158,7 @@ class Prediction(NamedTuple):
 class QuadraticProgram(NamedTuple):
     """Minimise 1/2 x'Px + c'x subject to row_min <= Ax <= row_max and x_min <= x <= x_max.
 
-    P is positive definite, shape (n, n), and A has shape (k, n), where k may be 0. Limits may be
-    infinite.
+    P is positive definite, A may have no rows, and limits may be infinite.
     """
 
     P: Vector
@@ -86,11 +171,7 @@ class QuadraticProgram(NamedTuple):
 
 
 def solve(problem: QuadraticProgram) -> Vector | None:
-    """Returns the minimiser, shape (n,), or None if the problem is infeasible.
-
-    Raises:
-        numpy.linalg.LinAlgError: P is not positive definite, or the solver failed.
-    """
+    """Returns the minimiser, shape (n,), or None if there is none; LinAlgError if DAQP fails."""
     # The first n limits, for which A has no rows, are those of the variables.
     x: Vector
     x, _, flag, _ = daqp.solve(
@@ -99,12 +180,10 @@ def solve(problem: QuadraticProgram) -> Vector | None:
         problem.A,
         np.concatenate((problem.x_max, problem.row_max)),
         np.concatenate((problem.x_min, problem.row_min)),
-        primal_tol=PRIMAL_TOLERANCE,
+        primal_tol=1e-10,  # In the rows' units over their length.
     )
-    if flag == OPTIMAL:
-        return x
-    if flag == INFEASIBLE:
-        return None
+    if flag in (1, -1):  # Optimal, infeasible.
+        return x if flag == 1 else None
     raise np.linalg.LinAlgError(f"DAQP ended with flag {flag}")
 
 
@@ -115,16 +194,15 @@ class HapticMpc:
         self.config = config
         self._K = np.diag(stiffness)
         self._effort = config.torque_change_weight * self._K**2
-        self._q_min = q_min
-        self._q_max = q_max
+        self._q_min, self._q_max = q_min, q_max
         self._max_change = np.deg2rad(config.max_change_deg)
         self._max_windup = np.deg2rad(config.max_windup_deg)
         self._reset_windup = np.deg2rad(config.reset_windup_deg)
 
     def step(self, state: MpcInput) -> Vector:
-        """Returns the change of the equilibrium angles, shape (m,), radians; 0 if infeasible."""
-        dq_d = solve(self.make_problem(state))
-        return np.zeros_like(state.q) if dq_d is None else dq_d
+        """Returns the change of the equilibrium angles, shape (m,), 0 if there is none."""
+        change = solve(self.make_problem(state))
+        return np.zeros_like(state.q) if change is None else change
 
     def pull_back(self, q: Vector, q_d: Vector) -> Vector:
         """Returns equilibrium angles clipped to the wind-up reset distance from joint angles q."""

@@ -3,8 +3,7 @@
 import numpy as np
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
-from lic_drake.control.mpc import HapticMpc, MpcInput
-from lic_drake.control.mpc_config import MpcConfig
+from lic_drake.control.mpc import HapticMpc, MpcConfig, MpcInput
 from lic_drake.control.taxels import TaxelLayout
 from lic_drake.robots.arm import Arm
 from lic_drake.types import Vector
@@ -23,27 +22,24 @@ class HapticMpcController(LeafSystem):
 
     def __init__(self, arm: Arm, layout: TaxelLayout, config: MpcConfig) -> None:
         super().__init__()
-        self._arm = arm
-        self._layout = layout
+        self._arm, self._layout = arm, layout
         self._mpc = HapticMpc(config, arm.stiffness, arm.q_min, arm.q_max)
-        self._num_joints = arm.num_joints
-        self._arm_state = self.DeclareVectorInputPort("arm_state", 2 * self._num_joints)
+        self._arm_state = self.DeclareVectorInputPort("arm_state", 2 * arm.num_joints)
         self._taxel_force = self.DeclareVectorInputPort("taxel_force", layout.num_taxels)
         self._goal = self.DeclareVectorInputPort("goal", 3)
-        desired = self.DeclareDiscreteState(2 * self._num_joints)
+        desired = self.DeclareDiscreteState(2 * arm.num_joints)
         self._desired = int(desired)
         self.DeclareStateOutputPort("desired_state", desired)
         self.DeclarePeriodicDiscreteUpdateEvent(config.period_s, 0.0, self._update)
 
     def set_equilibrium(self, context: Context, q_d: Vector) -> None:
         """Sets the equilibrium angles, shape (m,), radians, in a context of this system."""
-        context.SetDiscreteState(self._desired, np.append(q_d, np.zeros(self._num_joints)))
+        context.SetDiscreteState(self._desired, np.append(q_d, np.zeros_like(q_d)))
 
     def _update(self, context: Context, discrete_state: DiscreteValues) -> None:
-        m = self._num_joints
+        m = self._arm.num_joints
         q = np.asarray(self._arm_state.Eval(context))[:m]
         taxel_force = np.asarray(self._taxel_force.Eval(context))
-        p_RG = np.asarray(self._goal.Eval(context))
         held = context.get_discrete_state(self._desired).value()[:m]
         q_d = self._mpc.pull_back(q, held)
 
@@ -55,12 +51,11 @@ class HapticMpcController(LeafSystem):
         state = MpcInput(
             q=q,
             q_d=q_d,
-            p_EG=p_RG - pose.p_RE,
+            p_EG=np.asarray(self._goal.Eval(context)) - pose.p_RE,
             Jv_E=pose.Jv_E,
             normals=np.vecdot(turn, self._layout.n_L[loaded, None]),
             forces=taxel_force[loaded],
             Jv_C=self._arm.point_jacobians(pose, links, p_RC),
         )
-        desired = np.zeros(2 * m)
-        desired[:m] = q_d + self._mpc.step(state)
+        desired = np.append(q_d + self._mpc.step(state), np.zeros(m))
         discrete_state.set_value(self._desired, desired)

@@ -16,14 +16,7 @@ INSIDE_M = 1e-6
 
 
 class LinkTaxels(NamedTuple):
-    """The taxels of one link, in its frame.
-
-    Attributes:
-        taxels: Their indices in the layout, shape (n,).
-        p_LT: Positions, shape (n, 3), metres.
-        n_L: Outward unit normals, shape (n, 3).
-        half_square: |p_LT|^2 / 2, shape (n,), square metres.
-    """
+    """The taxels of one link, in its frame: their indices in the layout, and |p_LT|^2 / 2."""
 
     taxels: IntVector
     p_LT: Vector
@@ -31,22 +24,19 @@ class LinkTaxels(NamedTuple):
     half_square: Vector
 
     def compare_distances(self, p_LQ: Vector) -> Vector:
-        """Returns |p_QT|^2 / 2 - |p_LQ|^2 / 2 for points p_LQ, shape (.., 3): shape (.., n).
-
-        It orders taxels by distance from Q, as the subtracted term is common to all.
-        """
+        """Returns |p_QT|^2 / 2 - |p_LQ|^2 / 2, which orders taxels by distance from p_LQ."""
         return self.half_square - p_LQ @ self.p_LT.T
 
 
 @dataclass(frozen=True)
 class TaxelLayout:
-    """Taxels of an arm.
+    """n taxels of an arm.
 
     Attributes:
         pitch_m: Distance between neighbours in a row, metres.
         link: Index of each taxel's link, shape (n,).
         p_LT: Positions in the link frames, shape (n, 3), metres.
-        n_L: Outward unit normals in the link frames, shape (n, 3).
+        n_L: Outward unit normals, shape (n, 3).
     """
 
     pitch_m: float
@@ -62,21 +52,15 @@ class TaxelLayout:
     @cached_property
     def of_link(self) -> tuple[LinkTaxels, ...]:
         """The taxels of each link."""
-        links = []
-        for link in range(self.link.max() + 1):
-            taxels = np.flatnonzero(self.link == link)
-            p_LT = self.p_LT[taxels]
-            half_square = 0.5 * np.sum(p_LT**2, axis=1)
-            links.append(LinkTaxels(taxels, p_LT, self.n_L[taxels], half_square))
-        return tuple(links)
+        half_square = 0.5 * np.sum(self.p_LT**2, axis=1)
+        of_links = (np.flatnonzero(self.link == link) for link in range(self.link.max() + 1))
+        return tuple(LinkTaxels(k, self.p_LT[k], self.n_L[k], half_square[k]) for k in of_links)
 
 
 def make_taxels(arm: Arm, per_metre: float) -> TaxelLayout:
     """Returns the taxels of an arm: rows around capsules in the plane, else on all its faces.
 
-    Args:
-        arm: The arm.
-        per_metre: Density of the rows, 1/m (paper V-A: 100 in the plane).
+    Their density, 1/m, is 100 in the plane in paper V-A.
     """
     if arm.is_planar:
         return planar_taxels(arm.skin, per_metre)
@@ -91,7 +75,7 @@ def planar_taxels(skin: tuple[SkinShape, ...], per_metre: float = 100.0) -> Taxe
     """
     links, positions, normals = [], [], []
     cap = np.deg2rad(CAP_ANGLES_DEG)
-    for index, capsule in enumerate(skin):
+    for link, capsule in enumerate(skin):
         radius, length = capsule.size
         along = capsule.R_LS[:, 2]
         side = np.cross([0.0, 0.0, 1.0], along)
@@ -101,10 +85,9 @@ def planar_taxels(skin: tuple[SkinShape, ...], per_metre: float = 100.0) -> Taxe
         for end in (1.0, -1.0):
             centre = end * 0.5 * length * along
             rows += [(centre, np.cos(a) * end * along + np.sin(a) * side) for a in cap]
-        for centre, normal in rows:
-            links.append(index)
-            positions.append(capsule.p_LS + centre + radius * normal)
-            normals.append(normal)
+        links += [link] * len(rows)
+        positions += [capsule.p_LS + centre + radius * normal for centre, normal in rows]
+        normals += [normal for _, normal in rows]
     return TaxelLayout(1.0 / per_metre, np.array(links), np.array(positions), np.array(normals))
 
 
@@ -115,20 +98,13 @@ def surface_taxels(
 
     Rows are equally spaced, with half of that distance to the face's edges, so that all taxels
     represent equal areas.
-
-    Args:
-        surface: The shapes.
-        link_names: Names of the links, by index.
-        per_metre: Density of the rows, 1/m.
     """
     links, positions, normals = [], [], []
     for shape in surface:
         p_ST, n_S = _LATTICE[shape.kind](shape, per_metre)
         p_LT = shape.p_LS + p_ST @ shape.R_LS.T
-        free = np.ones(len(p_LT), dtype=bool)
-        for other in surface:
-            if other.link == shape.link and other is not shape:
-                free &= ~is_inside(other, p_LT)
+        others = [s for s in surface if s.link == shape.link and s is not shape]
+        free = ~np.any([np.zeros(len(p_LT)), *(is_inside(s, p_LT) for s in others)], axis=0)
         links.append(np.full(np.count_nonzero(free), link_names.index(shape.link)))
         positions.append(p_LT[free])
         normals.append((n_S @ shape.R_LS.T)[free])
@@ -151,23 +127,23 @@ def is_inside(shape: SkinShape, p_LQ: Vector) -> BoolVector:
 
 
 def _box(shape: SkinShape, per_metre: float) -> tuple[Vector, Vector]:
-    """Returns positions and normals on the six faces, in the shape's frame."""
-    positions, normals = [], []
+    """Returns positions and normals on the six faces, in S."""
+    faces = []
     for axis in range(3):
         u, v = (axis + 1) % 3, (axis + 2) % 3
         across, along = (_rows(shape.size[i], per_metre) for i in (u, v))
         rows = np.array([(a, b) for a in across for b in along])
         for sign in (1.0, -1.0):
-            p, n = np.zeros((len(rows), 3)), np.zeros((len(rows), 3))
-            p[:, axis], n[:, axis] = 0.5 * sign * shape.size[axis], sign
+            n = np.tile(sign * np.eye(3)[axis], (len(rows), 1))
+            p = 0.5 * shape.size[axis] * n
             p[:, [u, v]] = rows
-            positions.append(p)
-            normals.append(n)
+            faces.append((p, n))
+    positions, normals = zip(*faces, strict=True)
     return np.vstack(positions), np.vstack(normals)
 
 
 def _cylinder(shape: SkinShape, per_metre: float) -> tuple[Vector, Vector]:
-    """Returns positions and normals on barrel and ends, in the shape's frame."""
+    """Returns positions and normals on barrel and ends, in S."""
     radius, length = shape.size
     around = _ring(radius, per_metre)
     barrel = np.array([(c, s, z) for z in _rows(length, per_metre) for c, s in around])
@@ -184,7 +160,7 @@ def _cylinder(shape: SkinShape, per_metre: float) -> tuple[Vector, Vector]:
 
 
 def _capsule(shape: SkinShape, per_metre: float) -> tuple[Vector, Vector]:
-    """Returns positions and normals on barrel and hemispheres, in the shape's frame."""
+    """Returns positions and normals on barrel and hemispheres, in S."""
     radius, length = shape.size
     n_S = [(c, s, 0.0) for _ in _rows(length, per_metre) for c, s in _ring(radius, per_metre)]
     z = [z for z in _rows(length, per_metre) for _ in _ring(radius, per_metre)]

@@ -15,7 +15,7 @@ import numpy as np
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.clutter.registry import ClutterSampler, get_category
 from lic_drake.config import merge, read_mapping, read_section
-from lic_drake.control.mpc_config import PRESETS, MpcConfig
+from lic_drake.control.mpc import PRESETS, MpcConfig
 from lic_drake.errors import RequestError, ScenarioError
 from lic_drake.paths import scenarios_dir
 from lic_drake.reach.stop_rules import StopConfig

@@ -76,28 +76,9 @@ def test_solutions_satisfy_the_optimality_conditions_and_there_is_one_if_there_c
         assert kkt_residual(problem, x) < 1e-6
 
 
-def hand_made(row: list[float], low: float, P: np.ndarray) -> QuadraticProgram:
-    """Minimise 1/2 x'Px - x_1 in a box with one row of limits."""
-    return QuadraticProgram(
-        P=P,
-        c=np.array([-1.0, 0.0]),
-        A=np.array([row]),
-        row_min=np.array([low]),
-        row_max=np.array([np.inf]),
-        x_min=np.full(2, -0.5),
-        x_max=np.array([0.3, np.inf]),
-    )
-
-
-def test_hand_made_programs_have_their_known_optimum_or_none() -> None:
-    clipped = solve(hand_made([0.0, 0.0], 0.0, np.eye(2)))
-    assert clipped is not None
-    np.testing.assert_allclose(clipped, [0.3, 0.0], atol=1e-12)
-    on_row = solve(hand_made([1.0, 1.0], 1.0, np.eye(2)))
-    assert on_row is not None
-    np.testing.assert_allclose(on_row, [0.3, 0.7], atol=1e-9)
-    # Limits that contradict each other, and a row of zeros that excludes zero.
-    assert solve(hand_made([1.0, 0.0], 0.31, np.eye(2))) is None
-    assert solve(hand_made([0.0, 0.0], 1.0, np.eye(2))) is None
+def test_a_program_without_a_minimum_is_an_error_and_a_row_of_zeros_may_rule_all_out() -> None:
+    problem = random_problem(np.random.default_rng(0))
     with pytest.raises(np.linalg.LinAlgError):
-        solve(hand_made([1.0, 1.0], 0.0, np.diag([1.0, -1.0])))
+        solve(problem._replace(P=np.diag(np.append(-1.0, np.ones(len(problem.c) - 1)))))
+    row, limit = np.zeros((1, len(problem.c))), np.ones(1)
+    assert solve(problem._replace(A=row, row_min=limit, row_max=2.0 * limit)) is None

@@ -20,7 +20,17 @@ from pydrake.multibody.plant import (
 )
 from pydrake.multibody.tree import SpatialInertia, UnitInertia
 from pydrake.systems.framework import DiagramBuilder
-from support.worlds import ARM, LAYOUT, World, add_sensor, box, cylinder, make_clutter, make_world
+from support.worlds import (
+    ARM,
+    LAYOUT,
+    World,
+    add_sensor,
+    box,
+    controller_input,
+    cylinder,
+    make_clutter,
+    make_world,
+)
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.control.tactile_sensor import read_patches
@@ -65,21 +75,17 @@ def contact(
 def joint_torques(world: World, forces: np.ndarray) -> np.ndarray:
     """What the taxels' forces do to the joints, through the taxels' Jacobians."""
     loaded = np.flatnonzero(forces)
-    links = LAYOUT.link[loaded]
-    R_RL, p_RL = ARM.calc_pose(world.q)[:2]
-    p_RT = p_RL[links] + np.einsum("ijk,ik->ij", R_RL[links], LAYOUT.p_LT[loaded])
-    normals = np.einsum("ijk,ik->ij", R_RL[links], LAYOUT.n_L[loaded])
-    jacobians = ARM.point_jacobians(ARM.calc_pose(world.q), links, p_RT)
-    return -np.einsum("i,ij,ijk->k", forces[loaded], normals, jacobians)
+    state = controller_input(world.q, loaded, forces[loaded])
+    return -np.einsum("i,ij,ijk->k", state.forces, state.normals, state.Jv_C)
 
 
 # Sides of all links and both caps of the last one: link 3's first side is taxels 124..150, the
 # other 151..177, the caps 178..187.
 @pytest.mark.parametrize("taxel", [25, 58, 144, 180])
-@pytest.mark.parametrize("force", [5.0])
 def test_a_pressed_cylinder_reads_its_force_on_its_taxel_and_bends_the_arm_by_statics(
-    taxel: int, force: float
+    taxel: int,
 ) -> None:
+    force = 5.0
     world = make_world(BENT, make_clutter(object_at(taxel)), contact(), add_sensor)
     press(world, "object0", LAYOUT.link[taxel], LAYOUT.n_L[taxel], force)
     forces = world.taxel_force
@@ -91,8 +97,9 @@ def test_a_pressed_cylinder_reads_its_force_on_its_taxel_and_bends_the_arm_by_st
     np.testing.assert_allclose(deflection, torques, rtol=0.02, atol=2e-3 * force)
 
 
-@pytest.mark.parametrize(("skin_mesh", "object_mesh"), [(0.01, 0.01), (0.003, 0.002)])
-@pytest.mark.parametrize("modulus", [1e7, 1e8])
+@pytest.mark.parametrize(
+    ("modulus", "skin_mesh", "object_mesh"), [(1e8, 0.01, 0.01), (1e7, 0.003, 0.002)]
+)
 def test_the_reading_depends_neither_on_the_contact_meshes_nor_on_the_skins_modulus(
     modulus: float, skin_mesh: float, object_mesh: float
 ) -> None:
@@ -133,17 +140,6 @@ def test_point_contacts_are_read_as_well(monkeypatch: pytest.MonkeyPatch) -> Non
     np.testing.assert_allclose(deflection, joint_torques(world, forces), rtol=0.02, atol=0.01)
 
 
-def test_contacts_among_objects_and_no_contact_at_all_read_zero() -> None:
-    pair = make_clutter(cylinder(0.6, 0.0), cylinder(0.579, 0.0, movable=True))
-    world = make_world(BENT, pair, contact(), add_sensor)
-    np.testing.assert_array_equal(world.taxel_force, 0.0)
-    world.push("object1", np.zeros(3), np.array([5.0, 0.0, 0.0]))
-    world.advance(0.2)
-    results = world.scene.plant.get_contact_results_output_port().Eval(world.plant_context)
-    assert results.num_point_pair_contacts() == 1
-    np.testing.assert_array_equal(world.taxel_force, 0.0)
-
-
 def pressed_pair(first_soft: bool, second_soft: bool) -> tuple[ContactResults, list[GeometryId]]:
     """A body below and one above it, overlapping by 5 mm; the lower one is registered first."""
     builder = DiagramBuilder()
@@ -158,12 +154,7 @@ def pressed_pair(first_soft: bool, second_soft: bool) -> tuple[ContactResults, l
             name, SpatialInertia(1.0, np.zeros(3), UnitInertia.SolidSphere(0.05))
         )
         properties = ProximityProperties()
-        AddContactMaterial(
-            dissipation=0.0,
-            point_stiffness=1e4,
-            friction=CoulombFriction(0.0, 0.0),
-            properties=properties,
-        )
+        AddContactMaterial(0.0, 1e4, CoulombFriction(0.0, 0.0), properties)
         if soft:
             AddCompliantHydroelasticProperties(0.02, 1e6, properties)
         else:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from lic_drake.control.mpc_config import ijrr_2013
+from lic_drake.control.mpc import PRESETS
 from lic_drake.errors import ScenarioError
 from lic_drake.paths import scenarios_dir, shipped_library
 from lic_drake.reach.scenario import load_scenario, parse_scenario, to_dict
@@ -79,7 +79,7 @@ def test_overrides_replace_single_values_at_every_level() -> None:
 
 def test_an_mpc_preset_fills_what_the_file_leaves_open() -> None:
     changed = load_scenario("cylinder-clutter", "{mpc: {preset: ijrr_2013, force_threshold_N: 3}}")
-    assert changed.mpc == dataclasses.replace(ijrr_2013(), force_threshold_N=3.0)
+    assert changed.mpc == dataclasses.replace(PRESETS["ijrr_2013"](), force_threshold_N=3.0)
 
 
 @pytest.mark.parametrize(

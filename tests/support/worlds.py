@@ -1,6 +1,6 @@
 """Small worlds for tests: hand-made clutter, and arm and clutter without sensor or controller."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from lic_drake.clutter.instance import ClutterInstance, join, make_objects
+from lic_drake.control.mpc import MpcInput
 from lic_drake.control.tactile_sensor import TactileSensor
 from lic_drake.control.taxels import planar_taxels
 from lic_drake.robots.planar import planar_arm
@@ -20,6 +21,28 @@ LAYOUT = planar_taxels(ARM.skin)
 
 
 make_clutter = join
+
+
+def controller_input(
+    q: np.ndarray,
+    taxels: Sequence[int],
+    forces: Sequence[float],
+    q_d: np.ndarray | None = None,
+    p_EG: Sequence[float] = (0.0, 0.0, 0.0),
+) -> MpcInput:
+    """The controller's input at a configuration with forces on some taxels."""
+    index, pose = np.array(taxels, dtype=int), ARM.calc_pose(q)
+    links = LAYOUT.link[index]
+    p_RC = pose.p_RL[links] + np.einsum("ijk,ik->ij", pose.R_RL[links], LAYOUT.p_LT[index])
+    return MpcInput(
+        q=q,
+        q_d=q if q_d is None else q_d,
+        p_EG=np.array(p_EG),
+        Jv_E=pose.Jv_E,
+        normals=np.einsum("ijk,ik->ij", pose.R_RL[links], LAYOUT.n_L[index]),
+        forces=np.array(forces, dtype=float),
+        Jv_C=ARM.point_jacobians(pose, links, p_RC),
+    )
 
 
 def cylinder(
