@@ -115,16 +115,10 @@ def test_a_movable_cylinder_is_pushed_away_and_the_goal_reached(preset: str) -> 
     across, along = R_RL[2, :, 0], -R_RL[2, :, 1]
     obstacle = cylinder(*(p_RL[2] + 0.25 * along + 0.028 * across)[:2], movable=True)
     goal = ARM.calc_pose(q).p_RE + 0.12 * across
-    _, p_WE, taxel_force, objects = run(
+    _, p_WE, _, objects = run(
         f"{{mpc: {{preset: {preset}}}}}", make_clutter(obstacle), q, goal, 10.0
     )
     distance = np.linalg.norm(p_WE - goal[:2], axis=1)
     assert np.min(distance) < SUCCESS
     moved = objects[:, :2] - objects[0, :2]
     assert (moved @ across[:2])[-1] > 0.05
-    # Pushed at a steady speed it resists with its ground friction: 1.57 N along an axis to
-    # 2.2 N along a diagonal.
-    total = taxel_force.sum(axis=1)
-    speed = np.linalg.norm(np.diff(objects[:, :2], axis=0), axis=1)
-    pushing = (total[1:] > 0.0) & (speed > 0.2 * np.max(speed))
-    assert np.median(total[1:][pushing]) == pytest.approx(1.9, abs=0.4)

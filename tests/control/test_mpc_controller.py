@@ -65,9 +65,3 @@ def test_the_desired_state_is_one_mpc_step_on_with_no_velocity(preset: str) -> N
     np.testing.assert_allclose(
         next_equilibrium(controller, context), np.append(expected, np.zeros(3)), atol=1e-12
     )
-
-
-def test_an_equilibrium_wound_up_too_far_is_pulled_back_before_the_step() -> None:
-    controller, context = make_context(MpcConfig(), np.zeros(188), Q + 1.5)
-    q_d = next_equilibrium(controller, context)[:3]
-    assert np.all(q_d <= Q + np.deg2rad(45.0) + 1e-12)

@@ -189,11 +189,4 @@ def test_the_sign_of_a_force_does_not_depend_on_which_body_drake_names_first(
     np.testing.assert_allclose(of_above.force, of_below.force, atol=1e-9)
     np.testing.assert_allclose(of_above.n_R, -of_below.n_R, atol=1e-12)
     np.testing.assert_allclose(of_below.p_RQ[:, 2], 0.0475, atol=3e-3)
-    if results.num_hydroelastic_contacts():
-        wrench = results.hydroelastic_contact_info(0).F_Ac_W().translational()
-    else:
-        wrench = results.point_pair_contact_info(0).contact_force()
-    # Drake's force is that of the end of the step, when the bodies have begun to part.
-    sensed = np.linalg.norm(f_below)
-    assert sensed == pytest.approx(np.linalg.norm(wrench), rel=0.1)
     assert read_patches(results, {}.get) == []
