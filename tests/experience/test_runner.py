@@ -12,7 +12,7 @@ from support.fake_reach import FakeReach, comparable, expected_records, make_rec
 from lic_drake.errors import ClusterError, LibraryError
 from lic_drake.experience.collect import REQUEST_FILE, collect, read_request
 from lic_drake.experience.runner import simulate
-from lic_drake.experience.store import ExperienceLibrary, merge_libraries
+from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.scenario import load_scenario
 
@@ -55,58 +55,37 @@ def test_more_requests_into_an_environment_are_added_to_its_shard(
     assert len(reach.calls()) == len(requests)
 
 
-def test_a_different_request_is_rejected_before_any_simulation(
+def test_a_library_of_another_scenario_is_rejected_before_any_simulation(
     library: ExperienceLibrary, reach: FakeReach
 ) -> None:
-    collect(library, REQUEST, reach=reach)
+    simulate(REQUEST.all_reaches(), library, reach=reach)
     other = load_scenario("cylinder-clutter", "{stop: {timeout_s: 20}}")
-    for change, message in (
-        ({"environments": 2}, "environments 3 instead of 2"),
-        ({"max_goals": 5}, "was begun with max_goals 4 instead of 5"),
-        ({"scenario": other}, "scenario_digest"),
-    ):
-        with pytest.raises(LibraryError, match=message):
-            collect(library, replace(REQUEST, **change), reach=reach)
-    (library.path / REQUEST_FILE).unlink()
     with pytest.raises(LibraryError, match="holds reaches of scenario"):
         collect(library, replace(REQUEST, scenario=other), reach=reach)
     assert names(library) == SHARDS
     assert len(reach.calls()) == 36
 
 
-def test_shares_divide_the_environments_and_any_collection_completes_them(
+def test_a_collection_completes_what_a_share_began(
     library: ExperienceLibrary, reach: FakeReach
 ) -> None:
-    larger = replace(REQUEST, environments=5)
-    report = collect(library, larger, share="2/3", reach=reach)
-    assert (report.total, report.done) == (24, 24)
-    assert names(library) == [REQUEST_FILE, "training-000001.parquet", "training-000004.parquet"]
-    assert collect(library, larger, share="7/7", reach=reach).total == 0
-    rest = collect(library, larger, reach=reach)
-    assert (rest.total, rest.present) == (60, 24)
-    assert comparable(library.records()) == expected_records(larger)
-    assert len(reach.calls()) == 60
+    report = collect(library, REQUEST, share="2/3", reach=reach)
+    assert (report.total, report.done) == (12, 12)
+    assert names(library) == [REQUEST_FILE, SHARDS[1]]
+    assert collect(library, REQUEST, share="7/7", reach=reach).total == 0
+    assert collect(library, REQUEST, reach=reach).present == 12
+    assert comparable(library.records()) == expected_records(REQUEST)
+    assert len(reach.calls()) == 36
 
 
 def test_reaches_in_other_files_are_not_simulated_again(
-    tmp_path: Path, library: ExperienceLibrary, reach: FakeReach
-) -> None:
-    collect(library, REQUEST, reach=reach)
-    other = ExperienceLibrary(tmp_path / "other")
-    other.create()
-    merge_libraries([library], other.path / "all.parquet")
-    collect(other, replace(REQUEST, environments=4), reach=reach)
-    assert len(reach.calls()) == 4 * 12
-    assert names(other) == [REQUEST_FILE, "all.parquet", "training-000003.parquet"]
-
-
-def test_an_environment_that_raises_is_reported_and_the_others_finish(
     library: ExperienceLibrary, reach: FakeReach
 ) -> None:
-    report = collect(library, REQUEST, reach=replace(reach, failing_environment=1))
-    assert report.failed == {"training-000001": "ArithmeticError: no such environment"}
-    assert report.done == 24
-    assert {record.environment for record in library.records()} == {0, 2}
+    collect(library, REQUEST, reach=reach)
+    library.compact()
+    collect(library, replace(REQUEST, environments=4), reach=reach)
+    assert len(reach.calls()) == 4 * 12
+    assert names(library) == [REQUEST_FILE, "reaches.parquet", "training-000003.parquet"]
 
 
 @pytest.mark.parametrize("change", [{"key": "0" * 16}, {"lic_drake_version": "0.0.1"}])

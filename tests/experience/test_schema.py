@@ -40,22 +40,16 @@ VALUES = {
     tuple[float, ...]: st.lists(any_float | awkward_float, max_size=8).map(tuple),
 }
 FIELDS = {item.name: item.type for item in dataclasses.fields(ReachRecord)}
-any_record = st.fixed_dictionaries({name: VALUES[kind] for name, kind in FIELDS.items()}).map(
-    lambda values: ReachRecord(**values)
-)
+any_record = st.builds(ReachRecord, **{name: VALUES[kind] for name, kind in FIELDS.items()})
 
 
-def _bits(record: ReachRecord) -> list[object]:
-    """The values, with floats as bytes."""
-
-    def bits(value: object) -> object:
-        if isinstance(value, float):
-            return struct.pack("<d", value)
-        if isinstance(value, tuple):
-            return tuple(map(bits, value))
-        return type(value), value
-
-    return [bits(getattr(record, name)) for name in FIELDS]
+def _bits(value: object) -> object:
+    """Floats as bytes; other values with their types."""
+    if isinstance(value, float):
+        return struct.pack("<d", value)
+    if isinstance(value, tuple | list):
+        return [type(value), *map(_bits, value)]
+    return _bits(tuple(vars(value).values())) if isinstance(value, ReachRecord) else value
 
 
 @pytest.fixture
@@ -70,25 +64,20 @@ def shard(tmp_path: Path) -> Path:
 def test_records_round_trip_bit_for_bit(tmp_path: Path, records: list[ReachRecord]) -> None:
     path = tmp_path / "any.parquet"
     write_table(to_table(records, REQUEST.scenario), path)
-    assert list(map(_bits, to_records(read_shard(path)[1]))) == list(map(_bits, records))
+    assert _bits(to_records(read_shard(path)[1])) == _bits(records)
 
 
-def test_columns_are_the_fields_of_a_record_with_units(shard: Path) -> None:
-    schema = pq.read_schema(shard)
-    assert schema.names == [item.name for item in dataclasses.fields(ReachRecord)]
-    assert schema.field("peak_force").metadata[b"unit"] == b"N"
-    assert schema.field("start_phi").metadata[b"unit"] == b"rad"
-    assert all(schema.field(name).metadata[b"doc"] for name in schema.names)
-    assert schema.field("q_final").type.value_type == pa.float64()
-
-
-def test_a_file_carries_the_whole_scenario(tmp_path: Path) -> None:
+def test_a_file_carries_units_and_the_whole_scenario(tmp_path: Path) -> None:
     scenario = load_scenario("cylinder-clutter", "{task: {goal_area: {step_m: 0.3}}}")
     path = tmp_path / "shard.parquet"
     write_table(to_table([], scenario), path)
     header, _ = read_shard(path)
     assert parse_scenario(header["scenario"]) == scenario
     assert header["scenario_digest"] == scenario.digest
+    schema = pq.read_schema(path)
+    assert schema.names == list(FIELDS)
+    assert schema.field("peak_force").metadata[b"unit"] == b"N"
+    assert all(schema.field(name).metadata[b"doc"] for name in schema.names)
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=200)
@@ -127,10 +116,6 @@ def test_a_flipped_byte_in_any_column_is_detected(shard: Path) -> None:
             "has schema version 99, written by lic_drake 0.1.0, or .* reads version 4:",
         ),
         (lambda t: t.drop_columns(["peak_force"]), "or other columns"),
-        (
-            lambda t: t.set_column(5, "environment", t["environment"].cast(pa.float64())),
-            "or other col",
-        ),
     ],
 )
 def test_incompatible_tables_are_rejected(
@@ -143,39 +128,25 @@ def test_incompatible_tables_are_rejected(
     assert "\n" not in str(caught.value)
 
 
-def test_columns_are_read_in_the_requested_order(shard: Path) -> None:
-    for columns in (["weight", "key", "source"], []):
-        table = read_shard(shard, columns)[1]
-        assert (table.column_names, len(table)) == (columns, len(RECORDS))
-    with pytest.raises(LibraryError, match=r"cannot read .*none\.parquet: No such file"):
-        read_shard(shard.with_name("none.parquet"))
-
-
 @pytest.mark.parametrize("failure", ["fsync", "replace", "interrupt"])
-def test_a_failed_write_leaves_only_the_old_file(
+def test_failed_and_killed_writes_leave_the_old_file_and_do_no_harm(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failure: str
 ) -> None:
     path = tmp_path / "file"
     path.write_text("old")
+    (tmp_path / ".file.tmp").write_text("a longer half of a file, left by a killed process")
 
-    def write(temporary: Path) -> None:
-        temporary.write_text("new")
+    def fail(*_: object) -> None:
         if failure == "interrupt":
             raise KeyboardInterrupt
-
-    def refuse(*_: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync" if failure == "interrupt" else failure, fail)
+        with pytest.raises((LibraryError, KeyboardInterrupt)) as caught:
+            write_atomically(path, lambda temporary: temporary.write_text("new"))
     if failure != "interrupt":
-        monkeypatch.setattr(os, failure, refuse)
-    message = "^$" if failure == "interrupt" else f"cannot write {path}: No space left on device; c"
-    with pytest.raises((LibraryError, KeyboardInterrupt), match=message):
-        write_atomically(path, write)
+        assert str(caught.value).startswith(f"cannot write {path}: No space left on device; check")
     assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("file", "old")]
-
-
-def test_leftovers_of_a_killed_writer_are_replaced(tmp_path: Path) -> None:
-    path = tmp_path / "file"
-    (tmp_path / ".file.tmp").write_text("a longer half of a file")
     write_atomically(path, lambda temporary: temporary.write_text("new"))
     assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("file", "new")]

@@ -1,12 +1,14 @@
-"""The runner on real processes, some of which die."""
+"""The runner on real processes of this machine and of a Dask cluster, some of which die."""
 
 import os
 import signal
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from support.collecting import Start, check, is_alive, wait_until
+from support.collecting import Start, is_alive, wait_until
+from support.dask_cluster import DaskCluster, dask_cluster
 from support.fake_reach import (
     FakeReach,
     comparable,
@@ -15,86 +17,99 @@ from support.fake_reach import (
     make_request,
 )
 
+from lic_drake.errors import ClusterError
+from lic_drake.experience.check import check_library
 from lic_drake.experience.collect import collect
+from lic_drake.experience.runner import Progress, ReachFunction
 from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.experience.workers import LocalWorkers
+from lic_drake.experience.workers import DaskWorkers, LocalWorkers
 
 REQUEST = make_request()
-REACHES = REQUEST.reaches(0)
+DEADLY = REQUEST.reaches(0)[7].key
+NO_DASK = "Dask is missing: pip install 'lic_drake[cluster]'"
 
 
-def test_the_library_does_not_depend_on_the_number_of_workers(
-    tmp_path: Path, reach: FakeReach
+@pytest.fixture(scope="module")
+def dask() -> Iterator[DaskCluster]:
+    """A scheduler with two workers, which nannies restart."""
+    pytest.importorskip("distributed", reason=NO_DASK)
+    with dask_cluster(workers=2) as cluster:
+        yield cluster
+
+
+@pytest.fixture(params=["local", "dask"])
+def options(request: pytest.FixtureRequest) -> tuple[str, str]:
+    """Options of `lic collect` for two workers."""
+    if request.param == "local":
+        return ("--workers", "2")
+    return ("--scheduler", request.getfixturevalue("dask").address)
+
+
+def run(options: tuple[str, str], library: ExperienceLibrary, reach: ReachFunction) -> Progress:
+    kind, value = options
+    with LocalWorkers(2) if kind == "--workers" else DaskWorkers(value) as workers:
+        return collect(library, REQUEST, workers, reach=reach)
+
+
+def test_workers_simulate_the_same_library_in_their_own_processes(
+    options: tuple[str, str], library: ExperienceLibrary, reach: FakeReach
 ) -> None:
-    libraries = [ExperienceLibrary(tmp_path / name) for name in ("one", "two")]
-    for count, library in enumerate(libraries, start=1):
-        with LocalWorkers(count) as workers:
-            assert collect(library, REQUEST, workers, reach=reach).done == 36
-        assert comparable(library.records()) == expected_records(REQUEST)
-    assert len(reach.processes()) == 3
+    report = run(options, library, replace(reach, sleep_s=0.02))
+    assert (report.done, report.failed) == (36, {})
+    assert comparable(library.records()) == expected_records(REQUEST)
+    assert len(reach.calls()) == len(set(reach.calls())) == 36
+    assert len(reach.processes()) == 2
     assert os.getpid() not in reach.processes()
 
 
 def test_a_killed_worker_loses_only_the_environments_in_progress(
-    library: ExperienceLibrary, reach: FakeReach
+    options: tuple[str, str], library: ExperienceLibrary, reach: FakeReach
 ) -> None:
-    deadly = replace(reach, deadly=REQUEST.reaches(1)[7].key, deaths=1)
-    with LocalWorkers(2) as workers:
-        assert collect(library, REQUEST, workers, reach=deadly).failed == {}
+    assert run(options, library, replace(reach, deadly=DEADLY, deaths=1)).failed == {}
     assert comparable(library.records()) == expected_records(REQUEST)
     assert reach.log.with_suffix(".deaths").read_text() == "x"
 
 
-def test_a_deadly_environment_is_abandoned_and_the_others_finish(
-    library: ExperienceLibrary, reach: FakeReach
+def test_an_environment_that_aborts_the_interpreter_is_abandoned_and_the_others_finish(
+    options: tuple[str, str], library: ExperienceLibrary, reach: FakeReach
 ) -> None:
-    deadly = replace(reach, deadly=REACHES[7].key, deaths=99)
-    with LocalWorkers(2) as workers:
-        report = collect(library, REQUEST, workers, reach=deadly)
-    assert report.failed == {"training-000000": "its worker process died 3 times"}
+    deadly = replace(reach, deadly=DEADLY, deaths=99, death=signal.SIGABRT)
+    report = run(options, library, deadly)
+    assert list(report.failed) == ["training-000000"]
+    assert " died " in report.failed["training-000000"]
     assert report.done == 24
     assert {record.environment for record in library.records()} == {1, 2}
-    assert reach.log.with_suffix(".deaths").read_text() == "xxx"
+    if options[0] == "--workers":
+        assert reach.log.with_suffix(".deaths").read_text() == "xxx"
     assert collect(library, REQUEST, reach=reach).failed == {}
     assert comparable(library.records()) == expected_records(REQUEST)
 
 
-def test_ctrl_c_stops_quietly_and_the_same_command_resumes(
-    library: ExperienceLibrary, reach: FakeReach, start: Start
+@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGKILL])
+def test_after_an_interrupted_or_killed_collector_the_same_request_resumes(
+    options: tuple[str, str],
+    library: ExperienceLibrary,
+    reach: FakeReach,
+    start: Start,
+    end: signal.Signals,
 ) -> None:
-    slow = replace(reach, sleep_s=0.1)
-    process = start(library.path, slow, "--workers", "2")
-    wait_until(lambda: any(library.path.glob("*.parquet")))
-    os.killpg(process.pid, signal.SIGINT)
-    output, error = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert error == (
-        f"lic: stopped; finished environments are kept, go on with: lic collect {library.path}\n"
-    )
-    assert "Traceback" not in output + error
-    assert not any(is_alive(worker) for worker in reach.processes())
-    report = check(library.path)
-    kept = report["reaches"]
-    assert 12 <= kept < 36
-    assert (report["damaged"], report["duplicates"]) == ({}, [])
-
-    output, error = start(library.path, reach, "--workers", "2").communicate(timeout=60)
-    assert error == ""
-    assert f"36 of 36 reaches ({36 - kept} new" in output
-    assert comparable(library.records()) == expected_records(REQUEST)
-
-
-def test_a_killed_collection_leaves_no_workers_and_loses_no_finished_environment(
-    library: ExperienceLibrary, reach: FakeReach, start: Start
-) -> None:
-    process = start(library.path, replace(reach, sleep_s=0.1), "--workers", "2")
+    process = start(library.path, replace(reach, sleep_s=0.1), *options)
     wait_until(lambda: len(reach.processes()) == 2 and any(library.path.glob("*.parquet")))
-    process.kill()
-    process.communicate(timeout=60)
-    wait_until(lambda: not any(map(is_alive, reach.processes())), timeout_s=10.0)
-    finished = len(library.records())
-    with LocalWorkers(2) as workers:
-        assert collect(library, REQUEST, workers, reach=reach).present == finished >= 12
+    # Ctrl-C reaches the whole process group.
+    (os.killpg if end == signal.SIGINT else os.kill)(process.pid, end)
+    error = process.communicate(timeout=60)[1]
+    if end == signal.SIGINT:
+        assert process.returncode == 130
+        command = f"lic collect {library.path}"
+        if options[0] == "--scheduler":
+            command += f" --scheduler {options[1]}"
+        assert error == f"lic: stopped; finished environments are kept, go on with: {command}\n"
+    if options[0] == "--workers":
+        wait_until(lambda: not any(map(is_alive, reach.processes())), timeout_s=10.0)
+    report = check_library(library)
+    assert 12 <= report["reaches"] < 36
+    assert report["is_sound"]
+    assert collect(library, REQUEST, reach=reach).present == report["reaches"]
     assert comparable(library.records()) == expected_records(REQUEST)
 
 
@@ -105,14 +120,13 @@ def test_of_two_concurrent_collections_the_second_is_rejected(
     hold.touch()
     first = start(library.path, replace(reach, hold=hold), "--workers", "2")
     wait_until(lambda: any(library.path.glob("*.yaml")))
-    for options in ((), ("--share", "1/2")):
-        second = start(library.path, reach, *options)
-        error = second.communicate(timeout=60)[1]
-        assert second.returncode == 2
-        assert f"another process is adding to {library.path} (it holds" in error
+    second = start(library.path, reach, "--share", "1/2")
+    error = second.communicate(timeout=60)[1]
+    assert second.returncode == 2
+    assert f"another process is adding to {library.path} (it holds" in error
     hold.unlink()
     assert first.communicate(timeout=60)[1] == ""
-    assert check(library.path)["is_sound"]
+    assert check_library(library, REQUEST)["is_sound"]
     assert len(reach.calls()) == len(set(reach.calls())) == 36
 
 
@@ -126,7 +140,6 @@ def test_shares_of_a_job_array_fill_one_library_concurrently(
     assert all("1 environments x 4 goals x 3 starts = 12 reaches" in out for out, _ in results)
     assert comparable(library.records()) == expected_records(REQUEST)
     assert len(reach.calls()) == len(reach.processes()) * 12 == 36
-    assert check(library.path)["is_sound"]
 
 
 def test_workers_use_one_blas_thread(library: ExperienceLibrary) -> None:
@@ -136,3 +149,41 @@ def test_workers_use_one_blas_thread(library: ExperienceLibrary) -> None:
     with LocalWorkers(1) as workers:
         collect(library, request, workers, reach=count_threads)
     assert [record.detail for record in library.records()] == ["[1]"]
+
+
+def test_a_dask_worker_with_several_threads_is_rejected(
+    dask: DaskCluster, library: ExperienceLibrary, reach: FakeReach
+) -> None:
+    worker = dask.add_workers(1, threads=2)
+    with pytest.raises(ClusterError, match=r"has 2 threads, .* --nworkers 2 --nthreads 1; fin"):
+        run(("--scheduler", dask.address), library, reach)
+    dask.remove(worker)
+
+
+def test_a_reach_function_that_workers_cannot_import_is_one_error(
+    dask: DaskCluster, library: ExperienceLibrary, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "only_here.py").write_text("def reach(request): raise NotImplementedError")
+    monkeypatch.syspath_prepend(tmp_path)
+    import only_here
+
+    with pytest.raises(ClusterError, match="No module named 'only_here'; install the same pack"):
+        run(("--scheduler", dask.address), library, only_here.reach)
+
+
+def test_dask_workers_that_join_later_are_used_and_a_lost_scheduler_loses_no_shard(
+    library: ExperienceLibrary, reach: FakeReach, start: Start
+) -> None:
+    pytest.importorskip("distributed", reason=NO_DASK)
+    with dask_cluster(workers=0) as dask:
+        process = start(library.path, replace(reach, sleep_s=0.2), "--scheduler", dask.address)
+        dask.add_workers(2)
+        wait_until(lambda: any(library.path.glob("*.parquet")))
+        dask.scheduler.kill()
+        error = process.communicate(timeout=60)[1]
+        assert process.returncode == 2
+        waiting, lost = error.splitlines()
+        assert "no workers yet, waiting for some; start them with: dask worker tcp" in waiting
+        assert "lost the connection to the scheduler" in lost and "; finished env" in lost
+    assert 12 <= collect(library, REQUEST, reach=reach).present < 36
+    assert comparable(library.records()) == expected_records(REQUEST)

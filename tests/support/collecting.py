@@ -1,6 +1,5 @@
 """`lic collect` with fake reaches in processes of its own, for tests that kill them."""
 
-import json
 import os
 import pickle
 import signal
@@ -11,7 +10,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 from support.fake_reach import FakeReach
 
@@ -63,15 +61,6 @@ def environment(**values: str) -> dict[str, str]:
     """The environment of a process that can import the fakes."""
     path = os.pathsep.join([str(TESTS), os.environ.get("PYTHONPATH", "")])
     return {**os.environ, "PYTHONPATH": path, **values}
-
-
-def check(library: Path) -> dict[str, Any]:
-    """What `lic experience check --json` says of a library, in a process of its own."""
-    command = [sys.executable, "-m", "lic_drake", "experience", "check", str(library), "--json"]
-    result = subprocess.run(command, capture_output=True, text=True)
-    report: dict[str, Any] = json.loads(result.stdout)
-    assert result.returncode == (0 if report["is_sound"] else 1)
-    return report
 
 
 def wait_until(condition: Callable[[], bool], timeout_s: float = 60.0) -> None:
