@@ -90,7 +90,7 @@ def test_merge_writes_one_file(
     assert capsys.readouterr().out == f"36 reaches in {output}\n"
     assert len(pd.read_parquet(output)) == 36
     assert main(["experience", "merge", str(output), str(library)]) == 2
-    assert "exists; delete it" in capsys.readouterr().err
+    assert "exists, or does not end in .parquet; delete it" in capsys.readouterr().err
 
 
 def test_a_shipped_library_goes_by_its_name(capsys: pytest.CaptureFixture[str]) -> None:
