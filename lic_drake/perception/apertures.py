@@ -6,20 +6,17 @@ import numpy as np
 from scipy.special import ndtr
 
 from lic_drake.clutter.board import ApertureBoard
-from lic_drake.perception.board import BoardGrid, BoardView, locate_board, to_board
+from lic_drake.perception.board import BoardView, locate_board, to_grid, to_plane
 from lic_drake.perception.config import CameraConfig
 from lic_drake.perception.image import CameraImage, pose_covariance
 from lic_drake.types import Vector
 
 STATES = ("open", "partly", "blocked", "unseen")
 """States of an aperture."""
-
 OPEN_SHARE, BLOCKED_SHARE = 0.15, 0.85
 """An aperture is open, or blocked, if less, or more, than this share of it is covered."""
-
 MIN_SEEN = 0.5
 """An aperture of which a smaller share is seen is "unseen"."""
-
 EDGE_M = 0.005
 """Margin at the edges of an opening that is not evaluated, metres."""
 
@@ -34,26 +31,15 @@ class DetectedApertures:
         p_WA: Centres, in the middle of the board, shape (n, 3), metres.
         covariance: Of the centres, shape (n, 3, 3), m^2.
         corners: Corners of the openings at the front of the board, shape (n, 4, 3), metres.
-        covered: Covered share of the visible part of each opening, shape (n,).
-        seen: Visible share of each opening, shape (n,).
+        states: Each aperture's state, one of `STATES`.
         probability_open: Probability that an aperture is open, shape (n,).
     """
 
     p_WA: Vector
     covariance: Vector
     corners: Vector
-    covered: Vector
-    seen: Vector
+    states: tuple[str, ...]
     probability_open: Vector
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Each aperture's state, one of `STATES`."""
-        by_share = np.digitize(self.covered, [OPEN_SHARE, BLOCKED_SHARE])
-        return tuple(
-            STATES[k] if seen >= MIN_SEEN else "unseen"
-            for k, seen in zip(by_share, self.seen, strict=True)
-        )
 
 
 def find_apertures(
@@ -69,48 +55,56 @@ def find_apertures(
     Raises:
         PerceptionError: No such board is in view.
     """
-    view, grid = locate_board(image, camera, board)
-    clear = board.aperture_m - grid.bar_m
-    centres = grid.cell_centres()
-    values = view.sample(grid.to_plane(_visible_points(centres, clear, view, grid)))
+    view, pose, grid_covariance = locate_board(image, camera, board)
+    bar_m = pose[3]
+    clear = board.aperture_m - bar_m
+    y, z = (np.arange(n) - 0.5 * (n - 1) for n in (board.columns, board.rows))
+    centres = board.aperture_m * np.array([[yi, zi] for zi in z for yi in y])
+    values = view.sample(
+        to_plane(pose, _visible_points(centres, board.aperture_m, pose, view.p_BC))
+    )
     known = np.isfinite(values)
     seen = known.mean(axis=1)
     covered = np.where(known, values, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+    by_share = np.digitize(covered, [OPEN_SHARE, BLOCKED_SHARE])
+    states = np.where(seen < MIN_SEEN, STATES.index("unseen"), by_share)
     corner = 0.5 * clear * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    p_WA = view.to_world(grid.to_plane(centres), 0.5 * grid.bar_m)
+    p_WA = view.to_world(to_plane(pose, centres), 0.5 * bar_m)
     pixel_m = view.p_CO[2] / image.focal_px
     return DetectedApertures(
         p_WA=p_WA,
         covariance=np.array(
             [
-                _covariance(view, grid, centre) + pose_covariance(p - image.p_WC, camera.pose_error)
+                _covariance(view, grid_covariance, centre)
+                + pose_covariance(p - image.p_WC, camera.pose_error)
                 for centre, p in zip(centres, p_WA, strict=True)
             ]
         ),
-        corners=view.to_world(grid.to_plane(centres[:, np.newaxis] + corner)),
-        covered=covered,
-        seen=seen,
+        corners=view.to_world(to_plane(pose, centres[:, np.newaxis] + corner)),
+        states=tuple(STATES[state] for state in states),
         probability_open=_probability_open(covered, seen, pixel_m / clear),
     )
 
 
-def _covariance(view: BoardView, grid: BoardGrid, centre: Vector) -> Vector:
+def _covariance(view: BoardView, grid_covariance: Vector, centre: Vector) -> Vector:
     """Returns the covariance of an aperture's centre by the errors of the image, (3, 3), m^2."""
     R_WB = view.image.R_WC @ view.R_CB
     jacobian = np.array([[1.0, 0.0, -centre[1]], [0.0, 1.0, centre[0]]])
     in_B = np.zeros((3, 3))
-    in_B[0, 0] = view.sigma_m**2 + 0.25 * grid.covariance[3, 3]
-    in_B[1:, 1:] = jacobian @ grid.covariance[:3, :3] @ jacobian.T
+    in_B[0, 0] = view.sigma_m**2 + 0.25 * grid_covariance[3, 3]
+    in_B[1:, 1:] = jacobian @ grid_covariance[:3, :3] @ jacobian.T
     return np.asarray(R_WB @ in_B @ R_WB.T)
 
 
-def _visible_points(centres: Vector, clear: float, view: BoardView, grid: BoardGrid) -> Vector:
-    """Returns points of openings of width `clear` that the camera sees past the bars.
+def _visible_points(centres: Vector, aperture_m: float, pose: Vector, p_BC: Vector) -> Vector:
+    """Returns points that the camera sees past the bars, in openings with centres (n, 2).
 
-    Of apertures with centres (n, 2); shape (n, `_SAMPLES`^2, 2), metres.
+    Their shape is (n, `_SAMPLES`^2, 2), metres, in the grid's own axes.
     """
-    eye = to_board(grid.pose, view.p_BC[1:])
-    hidden = grid.bar_m / (grid.bar_m - view.p_BC[0])
+    bar_m = pose[3]
+    clear = aperture_m - bar_m
+    eye = to_grid(pose, p_BC[1:])
+    hidden = bar_m / (bar_m - p_BC[0])
     low, high = centres - 0.5 * clear, centres + 0.5 * clear
     low = low + np.maximum(eye - low, 0.0) * hidden + EDGE_M
     high = high - np.maximum(high - eye, 0.0) * hidden - EDGE_M

@@ -5,8 +5,6 @@ refined by least squares on the edges of its bars. Where a bar's side is visible
 the wood appears to end only behind that side; bars are assumed to be as thick as they are wide.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.ndimage import map_coordinates, uniform_filter
 from scipy.optimize import least_squares
@@ -19,21 +17,15 @@ from lic_drake.perception.config import CameraConfig
 from lic_drake.perception.image import CameraImage
 from lic_drake.types import Vector
 
-WOOD_HUE = (0.04, 0.13)
-"""Range of hues of the bars (between red and yellow), 0 to 1."""
-WOOD_SATURATION = 0.2
-"""Least saturation of the bars, 0 to 1: brown is not grey."""
-MIN_PIXELS = 500
-"""Least number of brown pixels of a board in view."""
-MAX_SAMPLES = 20_000
-"""Largest number of brown pixels that are fitted."""
-
+WOOD_HUE, WOOD_SATURATION = (0.04, 0.13), 0.2
+"""Range of hues of the bars (between red and yellow), and their least saturation, 0 to 1."""
+MIN_PIXELS, MAX_SAMPLES = 500, 20_000
+"""Least number of brown pixels of a board in view, and largest number that is fitted."""
 NEAR_M = 0.03
 """Points at most this far behind the board's front cover it; those further in front occlude it."""
 MEASURED_SHARE = 0.4
 """A pixel without depth is a gap in a surface if more than this share around it has depth: near a
 straight edge of the wood it is less outside and more inside."""
-
 FIRST_BAR_SHARE = 0.1
 """Initial guess of the bars' width, as a share of the aperture spacing."""
 MIN_MATCH = 0.5
@@ -110,66 +102,31 @@ class BoardView:
         return np.where(p_CQ[..., 2] > 0.0, nearest, np.nan)
 
 
-@dataclass(frozen=True, kw_only=True)
-class BoardGrid:
-    """Where the bars are in the board's plane.
-
-    Attributes:
-        board: Gives rows, columns and spacing only; the rest is measured.
-        pose: The board's centre (y, z) from the plane's origin, metres; its rotation in the plane,
-            from y to z, radians; the width of the bars, metres.
-        covariance: Of the pose, shape (4, 4).
-    """
-
-    board: ApertureBoard
-    pose: Vector
-    covariance: Vector
-
-    @property
-    def bar_m(self) -> float:
-        """Width of the bars."""
-        return float(self.pose[3])
-
-    def cell_centres(self) -> Vector:
-        """Returns the apertures' centres in the board's own axes, shape (n, 2), metres."""
-        y, z = (np.arange(n) - 0.5 * (n - 1) for n in _counts(self.board))
-        return self.board.aperture_m * np.array([[yi, zi] for zi in z for yi in y])
-
-    def bar_points(self) -> Vector:
-        """Returns points on the middle lines of the bars, in the plane, shape (n, 2), metres."""
-        half = 0.5 * self.board.aperture_m * _counts(self.board)
-        lines = [np.linspace(-h, h, n + 1) for h, n in zip(half, _counts(self.board), strict=True)]
-        along = [np.arange(-h, h, _RESOLUTION_M) for h in half]
-        grids = np.meshgrid(lines[0], along[1]), np.meshgrid(along[0], lines[1])
-        return self.to_plane(np.vstack([np.stack(grid, axis=-1).reshape(-1, 2) for grid in grids]))
-
-    def to_plane(self, at: Vector) -> Vector:
-        """Returns points in the plane from points of the board, both shape (.., 2)."""
-        c, s = np.cos(self.pose[2]), np.sin(self.pose[2])
-        return np.asarray(self.pose[:2] + at @ np.array([[c, s], [-s, c]]))
-
-
 def locate_board(
     image: CameraImage, camera: CameraConfig, board: ApertureBoard
-) -> tuple[BoardView, BoardGrid]:
-    """Returns the plane of a board and the grid of its bars.
+) -> tuple[BoardView, Vector, Vector]:
+    """Locates a board; see `find_apertures`.
 
-    Args:
-        image: What the camera sees.
-        camera: Gives the errors of depths.
-        board: Gives rows, columns and spacing, which is all that is known beforehand.
-
-    Raises:
-        PerceptionError: No such board is in view.
+    Returns:
+        The board's plane; the pose of its grid, shape (4,): centre (y, z) from the plane's origin,
+        metres, rotation in the plane from y to z, radians, and width of the bars, metres; the
+        covariance of the pose, shape (4, 4).
     """
     view = _fit_plane(image, camera)
     # Covers do not lie quite in the plane of the bars' fronts, so the plane is fitted to the bars.
-    view = view.moved_to(_fit_grid(view, board).bar_points())
-    return view, _fit_grid(view, board)
+    pose, _ = _fit_grid(view, board)
+    view = view.moved_to(to_plane(pose, _bar_points(board)))
+    return view, *_fit_grid(view, board)
 
 
-def to_board(pose: Vector, at: Vector) -> Vector:
-    """Returns points of the board from points in the plane, both shape (.., 2)."""
+def to_plane(pose: Vector, at: Vector) -> Vector:
+    """Returns points in the plane from points in the grid's own axes, both shape (.., 2)."""
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    return np.asarray(pose[:2] + at @ np.array([[c, s], [-s, c]]))
+
+
+def to_grid(pose: Vector, at: Vector) -> Vector:
+    """Returns points in the grid's own axes from points in the plane, both shape (.., 2)."""
     c, s = np.cos(pose[2]), np.sin(pose[2])
     return np.asarray((at - pose[:2]) @ np.array([[c, -s], [s, c]]))
 
@@ -208,8 +165,8 @@ def _fit_plane(image: CameraImage, camera: CameraConfig) -> BoardView:
     return BoardView(image, np.array([0.0, 0.0, z]), R_CB, sigma * z**2 / np.sqrt(inliers))
 
 
-def _fit_grid(view: BoardView, board: ApertureBoard) -> BoardGrid:
-    """Finds the grid of bars."""
+def _fit_grid(view: BoardView, board: ApertureBoard) -> tuple[Vector, Vector]:
+    """Returns the pose of the grid of bars, and its covariance."""
     extent, size = view.covered_range(), _counts(board) * board.aperture_m
     # Leaves room for a board that is partly out of view, and for its surroundings.
     margin = np.maximum(size - (extent[1] - extent[0]), 0.0) + board.aperture_m
@@ -230,14 +187,22 @@ def _fit_grid(view: BoardView, board: ApertureBoard) -> BoardGrid:
     first = np.array([y[0], z[0]]) + _RESOLUTION_M * (np.array([column, row]) + half)
     edges = _edges(seen, y, z)
     pose = np.array([*first, 0.0, FIRST_BAR_SHARE * board.aperture_m])
-    for _ in range(2):  # The second time with gates around the first result.
-        pose, covariance = _refine(pose, edges, board, view.p_BC)
-    return BoardGrid(board=board, pose=pose, covariance=covariance)
+    pose, _ = _refine(pose, edges, board, view.p_BC)
+    return _refine(pose, edges, board, view.p_BC)  # With gates around the first result.
 
 
 def _counts(board: ApertureBoard) -> Vector:
     """Returns the numbers of apertures across and up, shape (2,)."""
     return np.array([board.columns, board.rows])
+
+
+def _bar_points(board: ApertureBoard) -> Vector:
+    """Returns points on the middle lines of the bars, in the grid's own axes, shape (n, 2)."""
+    half = 0.5 * board.aperture_m * _counts(board)
+    lines = [np.linspace(-h, h, n + 1) for h, n in zip(half, _counts(board), strict=True)]
+    along = [np.arange(-h, h, _RESOLUTION_M) for h in half]
+    grids = np.meshgrid(lines[0], along[1]), np.meshgrid(along[0], lines[1])
+    return np.vstack([np.stack(grid, axis=-1).reshape(-1, 2) for grid in grids])
 
 
 def _template(size: Vector, aperture_m: float) -> Vector:
@@ -271,7 +236,7 @@ def _refine(
     kept: list[tuple[Vector, Vector, Vector]] = []  # Of each axis: points, lines, sides.
     counts = _counts(board)
     for axis, found in enumerate(edges):
-        at = to_board(guess, found[:, :2])
+        at = to_grid(guess, found[:, :2])
         bars = board.aperture_m * (np.arange(counts[axis] + 1.0) - 0.5 * counts[axis])
         nearest = np.argmin(np.abs(at[:, axis, np.newaxis] - bars), axis=1)
         off = at[:, axis] - _seen_edges(guess, bars[nearest], found[:, 2], p_BC, axis)
@@ -291,7 +256,7 @@ def _refine(
     def residuals(pose: Vector) -> Vector:
         return np.concatenate(
             [
-                to_board(pose, points)[:, axis] - _seen_edges(pose, lines, sides, p_BC, axis)
+                to_grid(pose, points)[:, axis] - _seen_edges(pose, lines, sides, p_BC, axis)
                 for axis, (points, lines, sides) in enumerate(kept)
             ]
         )
@@ -304,14 +269,10 @@ def _refine(
 def _seen_edges(pose: Vector, line: Vector, side: Vector, p_BC: Vector, axis: int) -> Vector:
     """Returns where bars appear to end, projected onto the front of the board.
 
-    Args:
-        pose: Of the grid.
-        line: Middle lines of the bars, shape (n,), metres.
-        side: 1 for the upper or left edge of a bar, -1 for the other, shape (n,).
-        p_BC: The camera's position in the plane's frame, shape (3,), metres.
-        axis: 0 for upright bars, 1 for level ones.
+    `line` are the bars' middle lines; `side` is 1 for the upper or left edge of a bar, -1 for the
+    other; `axis` is 0 for upright bars, 1 for level ones.
     """
     front = line + 0.5 * side * pose[3]
-    to_eye = to_board(pose, p_BC[np.newaxis, 1:])[0, axis] - front
+    to_eye = to_grid(pose, p_BC[np.newaxis, 1:])[0, axis] - front
     hidden = np.where(to_eye * side > 0.0, to_eye * pose[3] / (pose[3] - p_BC[0]), 0.0)
     return np.asarray(front + hidden)

@@ -22,7 +22,6 @@ from pydrake.geometry import (
     RenderCameraCore,
     RenderEngine,
     RenderEngineVtkParams,
-    RenderLabel,
     Rgba,
     SceneGraph,
     Shape,
@@ -35,7 +34,7 @@ from pydrake.systems.sensors import CameraInfo, ImageDepth32F, ImageRgba8U, Rgbd
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import RenderingError
 from lic_drake.perception.config import CameraConfig, CamerasConfig
-from lic_drake.perception.image import CameraImage, disturbed_image
+from lic_drake.perception.image import CameraImage
 from lic_drake.robots.pr2 import HEAD_CAMERA, RIGHT_ARM_AT_REST, make_pr2
 from lic_drake.scene.scene import Scene, SceneConfig, add_scene
 from lic_drake.types import Vector
@@ -43,13 +42,9 @@ from lic_drake.types import Vector
 RENDERER = "vtk"
 """Name of the renderer in a scene graph."""
 
-PACKAGES = "libegl1 libgl1 libgl1-mesa-dri"
-"""Debian packages that the renderer needs."""
-
 BALL_COLOR, FLOOR_COLOR = np.array([[0.95, 0.80, 0.05, 1.0], [0.62, 0.62, 0.64, 1.0]])
 """RGBA."""
 
-_CLIPPING_M = (0.02, 20.0)
 # A ceiling lamp, and some light from the camera.
 _ROOM = (
     LightParameter(type="directional", frame="world", direction=[0.3, -0.2, -1.0], intensity=0.8),
@@ -71,7 +66,8 @@ def make_renderer(lights: Sequence[LightParameter] = _ROOM) -> RenderEngine:
     except RuntimeError as error:
         raise RenderingError(
             f"cameras cannot be simulated: {' '.join(str(error).split())} A graphics library is"
-            f" missing or does not work; install it with: apt-get install {PACKAGES}"
+            " missing or does not work; install it with: apt-get install libegl1 libgl1"
+            " libgl1-mesa-dri"
         ) from None
 
 
@@ -93,19 +89,6 @@ def take_views(instance: ClutterInstance, p_WG: Vector, cameras: CamerasConfig) 
     )
 
 
-def disturbed_views(
-    views: Views,
-    cameras: CamerasConfig,
-    head_rng: np.random.Generator,
-    external_rng: np.random.Generator,
-) -> Views:
-    """Returns both images with the cameras' errors; the sources may be the same."""
-    return Views(
-        disturbed_image(views.head, cameras.head.camera, head_rng),
-        disturbed_image(views.external, cameras.external.camera, external_rng),
-    )
-
-
 def add_cameras(
     builder: DiagramBuilder,
     instance: ClutterInstance,
@@ -115,17 +98,9 @@ def add_cameras(
 ) -> tuple[Scene, RgbdSensor, RgbdSensor]:
     """Adds an environment, a ball at the goal, a PR2 that observes it, and the cameras.
 
-    In the default context the robot stands where it looks from, its right arm at its side.
-
-    Args:
-        builder: Gets plant, scene graph and the sensors `head` and `external`.
-        instance: The environment.
-        p_WG: The goal, shape (3,), metres.
-        cameras: The cameras.
-        ahead: Whether the robot faces along x instead of where it looks.
-
-    Returns:
-        The scene, the sensor on the robot's head and the external one, which sees the goal.
+    In the default context the robot stands where it looks from, its right arm at its side; it faces
+    along x if `ahead`, else as the head's configuration says. Returned are the scene, the sensor on
+    the head and the external one.
 
     Raises:
         RenderingError: The renderer does not work on this machine.
@@ -184,19 +159,13 @@ def add_camera(
 ) -> RgbdSensor:
     """Adds a sensor to a scene graph with a renderer named `RENDERER`.
 
-    Args:
-        builder: Gets the sensor.
-        scene_graph: The scene graph.
-        name: Name of the system.
-        config: Size, focal length and range.
-        X_PC: Pose of the camera, its z axis forward, in its parent frame.
-        parent: The frame; the world by default.
+    X_PC is the camera's pose, its z axis forward, in its parent frame, by default the world.
     """
     # The optical axis in the middle of the image. Drake's own default is half a pixel less, which
     # draws what is straight ahead half a pixel off it (2 mm at 2 m).
     centre = 0.5 * config.width, 0.5 * config.height
     info = CameraInfo(config.width, config.height, config.focal_px, config.focal_px, *centre)
-    core = RenderCameraCore(RENDERER, info, ClippingRange(*_CLIPPING_M), RigidTransform())
+    core = RenderCameraCore(RENDERER, info, ClippingRange(0.02, 20.0), RigidTransform())
     sensor = RgbdSensor(
         scene_graph.world_frame_id() if parent is None else parent,
         X_PC,
@@ -216,7 +185,6 @@ def add_prop(scene_graph: SceneGraph, name: str, shape: Shape, p_WO: Vector, col
     )
     properties = PerceptionProperties()
     properties.AddProperty("phong", "diffuse", Rgba(*color))
-    properties.AddProperty("label", "id", RenderLabel.kDontCare)
     scene_graph.AssignRole(source, geometry, properties)
 
 

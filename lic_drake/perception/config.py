@@ -98,8 +98,7 @@ class ExternalConfig:
         check_numbers(self, vectors={"p_WC": 3, "target": 3})
         if np.linalg.norm(np.subtract(self.target, self.p_WC)[:2]) < 1e-6:
             raise ScenarioError(
-                f"an external camera cannot look straight up or down, from {self.p_WC} at"
-                f" {self.target}; move it"
+                f"a camera at {self.p_WC} cannot look straight up or down at {self.target}; move it"
             )
 
 
@@ -116,21 +115,20 @@ class CamerasConfig:
         check_numbers(self, ranges={"ball_radius_m": (0.001, 1.0)})
 
 
-def load_cameras(name_or_path: str | Path = "foliage") -> CamerasConfig:
+def load_cameras(name: str | Path = "foliage") -> CamerasConfig:
     """Reads the cameras of models/cameras/<name>.yaml, or of a YAML file.
 
     Raises:
         ScenarioError: There is no such file, or a key or value does not fit.
     """
-    path, shipped = Path(name_or_path), models_dir() / "cameras"
+    path, shipped = Path(name), models_dir() / "cameras"
     if path.suffix not in (".yaml", ".yml"):
-        path = shipped / f"{name_or_path}.yaml"
+        path = shipped / f"{name}.yaml"
     try:
         text = path.read_bytes()
     except (OSError, ValueError):
         known = ", ".join(sorted(p.stem for p in shipped.glob("*.yaml")))
         raise ScenarioError(
-            f"no cameras {str(name_or_path)!r}; shipped cameras: {known}, or give a .yaml path"
+            f"no cameras {str(name)!r}; shipped cameras: {known}, or give a .yaml path"
         ) from None
-    source = str(name_or_path)
-    return read_section(CamerasConfig, read_mapping(text, source), source)
+    return read_section(CamerasConfig, read_mapping(text, str(path)), str(path))

@@ -17,7 +17,7 @@ YELLOW_HUE = (0.105, 0.19)
 YELLOW_SATURATION, YELLOW_VALUE = 0.6, 0.25
 """Least saturation and brightness of the ball, 0 to 1."""
 MIN_PIXELS = 20
-"""Minimum number of pixels of the ball."""
+"""Least number of pixels of the ball."""
 RIM = 0.2
 """Rays that enter the ball by less than this share of radius^2 are left out of the covariance."""
 
@@ -29,23 +29,17 @@ class DetectedGoal:
     Attributes:
         p_WG: Its centre, shape (3,), metres.
         covariance: Of the centre, shape (3, 3), m^2.
-        num_pixels: Number of pixels of the yellow spot.
     """
 
     p_WG: Vector
     covariance: Vector
-    num_pixels: int
 
 
 def find_goal(image: CameraImage, camera: CameraConfig, ball_radius_m: float) -> DetectedGoal:
     """Fits a ball to the depths of the largest yellow spot.
 
-    The fit does not use the outline, so leaves in front of the ball do not shift it.
-
-    Args:
-        image: What the camera sees.
-        camera: Gives the errors of depths and of the camera's pose.
-        ball_radius_m: Radius of the ball, metres.
+    The fit does not use the outline, so leaves in front of the ball do not shift it. `camera` gives
+    the errors of depths and of the camera's pose.
 
     Raises:
         PerceptionError: No ball is in view.
@@ -54,19 +48,13 @@ def find_goal(image: CameraImage, camera: CameraConfig, ball_radius_m: float) ->
     yellow = (hue > YELLOW_HUE[0]) & (hue < YELLOW_HUE[1])
     yellow &= (saturation > YELLOW_SATURATION) & (value > YELLOW_VALUE)
     spots = label(yellow)  # type: ignore[no-untyped-call]
-    num_pixels = np.bincount(spots[yellow], minlength=1)
-    largest = int(np.argmax(num_pixels))
-    if num_pixels[largest] < MIN_PIXELS:
-        raise PerceptionError(
-            f"no yellow ball in view: the largest yellow spot has {num_pixels[largest]} pixels, at"
-            f" least {MIN_PIXELS} are needed; turn or move the external camera"
-        )
+    largest = 1 + np.argmax(np.bincount(spots[yellow], minlength=2)[1:])
     shown = (spots == largest) & np.isfinite(image.depth)
     depth, rays = image.depth[shown], image.rays()[shown]
     if len(depth) < MIN_PIXELS:
         raise PerceptionError(
-            f"the yellow ball has depth in {len(depth)} pixels, at least {MIN_PIXELS} are needed;"
-            " move the external camera so that the ball is within its range"
+            f"no yellow ball in view: the largest yellow spot has {len(depth)} pixels with depth,"
+            f" at least {MIN_PIXELS} are needed; turn or move the external camera"
         )
     p_CG, covariance = _fit_ball(rays, depth, camera, ball_radius_m)
     p_WG = image.p_WC + image.R_WC @ p_CG
@@ -74,7 +62,6 @@ def find_goal(image: CameraImage, camera: CameraConfig, ball_radius_m: float) ->
         p_WG=p_WG,
         covariance=image.R_WC @ covariance @ image.R_WC.T
         + pose_covariance(p_WG - image.p_WC, camera.pose_error),
-        num_pixels=int(num_pixels[largest]),
     )
 
 

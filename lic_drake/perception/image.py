@@ -64,14 +64,7 @@ class CameraImage:
 
 
 def add_depth_noise(depth: Vector, config: NoiseConfig, rng: np.random.Generator) -> Vector:
-    """Returns what a depth camera would measure.
-
-    Args:
-        depth: True depths along the optical axis, shape (height, width), metres; NaN where there
-            is none.
-        config: The errors.
-        rng: Source of the draws.
-    """
+    """Returns what would be measured of true depths, shape (height, width), metres or NaN."""
     disparity = 1.0 / depth
     disparity += config.depth_sigma_per_m * rng.standard_normal(depth.shape)
     if config.depth_step_per_m > 0.0:
@@ -103,9 +96,7 @@ def disturbed_image(
 def pose_covariance(p_CQ_W: Vector, config: PoseErrorConfig) -> Vector:
     """Returns the covariance of a point by the errors of the camera's pose, shape (3, 3), m^2.
 
-    Args:
-        p_CQ_W: The point relative to the camera, in W, shape (3,), metres.
-        config: The errors, the same along all axes.
+    p_CQ_W is the point relative to the camera, in W, shape (3,), metres.
     """
     x, y, z = p_CQ_W
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -1,6 +1,8 @@
 """The robot's belief about board, apertures and goal before each attempt, from its cameras."""
 
 from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,10 +10,10 @@ from numpy.typing import NDArray
 from lic_drake.clutter.board import ApertureBoard
 from lic_drake.errors import PerceptionError, ScenarioError
 from lic_drake.perception.apertures import DetectedApertures, find_apertures
-from lic_drake.perception.cameras import Views, disturbed_views, take_views
+from lic_drake.perception.cameras import Views, take_views
 from lic_drake.perception.config import CamerasConfig
 from lic_drake.perception.goal import DetectedGoal, find_goal
-from lic_drake.perception.image import CameraImage
+from lic_drake.perception.image import CameraImage, disturbed_image
 from lic_drake.reach.request import ReachRecord
 from lic_drake.reach.scenario import Scenario
 from lic_drake.seeds import make_generator
@@ -22,43 +24,27 @@ LEAST_PROBABILITY = 0.5
 """Apertures whose probability of being open is lower are treated as blocked."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Look:
-    """What the robot saw, with the cameras' errors, and detected.
+class Belief(NamedTuple):
+    """The robot's belief about the board, the apertures and the goal.
 
     Attributes:
-        head: The image from the PR2's head, in which it detected the apertures.
+        head: The image from the PR2's head, with its errors, in which it detected the apertures.
         external: The image from the other camera, in which it detected the goal.
-        apertures: The apertures.
-        goal: The goal.
+        starts: The initial conditions at the apertures that are believed open.
+        open_index: Indices of these apertures in `apertures`, shape (k,).
     """
 
     head: CameraImage
     external: CameraImage
     apertures: DetectedApertures
     goal: DetectedGoal
-
-
-@dataclass(frozen=True, kw_only=True)
-class Belief:
-    """The robot's belief about the board, the apertures and the goal.
-
-    Attributes:
-        look: What it saw.
-        p_WG: Believed position of the goal, shape (3,), metres.
-        starts: The initial conditions at the apertures that are believed open.
-        index: Indices of these apertures in `look.apertures`, shape (k,).
-    """
-
-    look: Look
-    p_WG: Vector
     starts: BoardStarts
-    index: NDArray[np.intp]
+    open_index: NDArray[np.intp]
 
     def over_all(self, values: Vector) -> Vector:
         """Returns values of the open apertures, shape (k,), with NaN for all others, shape (n,)."""
-        all_values = np.full(len(self.look.apertures.p_WA), np.nan)
-        all_values[self.index] = values
+        all_values = np.full(len(self.apertures.p_WA), np.nan)
+        all_values[self.open_index] = values
         return all_values
 
 
@@ -69,11 +55,8 @@ class Observer:
     Images are rendered once; each look has its own errors.
 
     Attributes:
-        scenario: The scenario.
         stream: Seed stream of the environment, and of the cameras' errors.
-        environment: Its index.
         p_WG: True position of the ball, shape (3,), metres.
-        cameras: The cameras.
         moves: Whether base and torso may move.
     """
 
@@ -89,7 +72,7 @@ class Observer:
     def __call__(self, number: int) -> tuple[Vector, FeasibleStarts]:
         """Returns the believed p_WG, shape (3,), metres, and starts before an attempt, from 0."""
         belief = self.belief(number)
-        return belief.p_WG, belief.starts
+        return belief.goal.p_WG, belief.starts
 
     def belief(self, number: int) -> Belief:
         """Returns the belief before an attempt, from 0.
@@ -99,25 +82,22 @@ class Observer:
             PerceptionError: The board or the ball is not in view, or no aperture looks open.
         """
         if number not in self._beliefs:
-            self._beliefs[number] = estimate_board(self.scenario, self._look(number), self.moves)
+            self._beliefs[number] = self._observe(number)
         return self._beliefs[number]
 
-    def _look(self, number: int) -> Look:
-        scenario, cameras, at = self.scenario, self.cameras, (self.stream, self.environment)
+    def _observe(self, number: int) -> Belief:
+        scenario, cameras = self.scenario, self.cameras
         if self._views is None:
-            self._views = take_views(scenario.sample_instance(*at), self.p_WG, cameras)
-        rngs = (
-            make_generator(self.stream, "camera errors", self.environment, 2 * number + camera)
-            for camera in (0, 1)
+            instance = scenario.sample_instance(self.stream, self.environment)
+            self._views = take_views(instance, self.p_WG, cameras)
+        make_rng = partial(make_generator, self.stream, "camera errors", self.environment)
+        head = disturbed_image(self._views.head, cameras.head.camera, make_rng(2 * number))
+        external = disturbed_image(
+            self._views.external, cameras.external.camera, make_rng(2 * number + 1)
         )
-        views = disturbed_views(self._views, cameras, *rngs)
-        board, head, external = board_of(scenario), cameras.head, cameras.external
-        return Look(
-            head=views.head,
-            external=views.external,
-            apertures=find_apertures(views.head, head.camera, board),
-            goal=find_goal(views.external, external.camera, cameras.ball_radius_m),
-        )
+        apertures = find_apertures(head, cameras.head.camera, board_of(scenario))
+        goal = find_goal(external, cameras.external.camera, cameras.ball_radius_m)
+        return Belief(head, external, apertures, goal, *starts_at(scenario, apertures, self.moves))
 
     def touches_ball(self, record: ReachRecord) -> bool:
         """Returns whether a reach that came to its believed goal ended inside the ball."""
@@ -127,19 +107,17 @@ class Observer:
 
 
 def board_of(scenario: Scenario) -> ApertureBoard:
-    """Returns the board of a scenario.
-
-    Raises:
-        ScenarioError: It has none.
-    """
+    """Returns the board of a scenario; a `ScenarioError` says that it has none."""
     board = scenario.clutter
     if not isinstance(board, ApertureBoard):
         raise ScenarioError(f"{scenario.category} has no board; use foliage-aperture-clutter")
     return board
 
 
-def estimate_board(scenario: Scenario, look: Look, moves: bool = True) -> Belief:
-    """Returns the belief after a look; base and torso may move if `moves`.
+def starts_at(
+    scenario: Scenario, found: DetectedApertures, moves: bool = True
+) -> tuple[BoardStarts, NDArray[np.intp]]:
+    """Returns the starts at the apertures that look open, and the indices of these apertures.
 
     The robot knows the size of the board and of its bars, and that the board is upright and
     perpendicular to x; where the board is, and what is open, it has seen.
@@ -148,7 +126,6 @@ def estimate_board(scenario: Scenario, look: Look, moves: bool = True) -> Belief
         PerceptionError: No aperture looks open, or the board is at an impossible place.
     """
     board = board_of(scenario)
-    found = look.apertures
     index = np.flatnonzero(found.probability_open > LEAST_PROBABILITY)
     if len(index) == 0:
         raise PerceptionError(
@@ -162,9 +139,4 @@ def estimate_board(scenario: Scenario, look: Look, moves: bool = True) -> Belief
     believed = replace(scenario, clutter=seen)  # type: ignore[arg-type]
     covered = np.delete(np.arange(len(found.p_WA)), index)
     starts = board_starts(believed, seen.blocked_board(covered), moves)
-    return Belief(
-        look=look,
-        p_WG=look.goal.p_WG,
-        starts=replace(starts, probability_open=found.probability_open[index]),
-        index=index,
-    )
+    return replace(starts, probability_open=found.probability_open[index]), index

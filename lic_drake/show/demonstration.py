@@ -108,12 +108,13 @@ def demonstrate(
         if observer is None:
             return p_WG, known
         belief = observer.belief(number)
-        error_mm = 1000 * np.linalg.norm(belief.p_WG - p_WG)
+        seen = belief.goal.p_WG
         say(
-            f"look {number + 1}: {len(belief.index)} of {len(belief.look.apertures.p_WA)} apertures"
-            f" look open, the ball is detected at {_metres(belief.p_WG)} m, {error_mm:.0f} mm off"
+            f"look {number + 1}: {len(belief.open_index)} of {len(belief.apertures.p_WA)} apertures"
+            f" look open, the ball is detected at {_metres(seen)} m,"
+            f" {1000 * np.linalg.norm(seen - p_WG):.0f} mm off"
         )
-        return belief.p_WG, belief.starts
+        return seen, belief.starts
 
     def reach(request: ReachRequest) -> ReachRecord:
         say(f"attempt {len(traces) + 1}: starts at {describe_start(request.start)}")

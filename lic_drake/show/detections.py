@@ -42,13 +42,13 @@ def look_figure(
     selector: LicSelector, observer: Observer, attempts: Sequence[Attempt], number: int
 ) -> Figure:
     """Returns what was seen before an attempt, from 1, and what was estimated from it."""
-    look = observer.belief(number - 1).look
+    belief = observer.belief(number - 1)
     figure = Figure(figsize=(15.0, 4.3), layout="constrained")
     seen, estimated, external = figure.subplots(1, 3)
-    draw_apertures(seen, look.head, look.apertures)
+    draw_apertures(seen, belief.head, belief.apertures)
     seen.set_title("head camera: probability of being open", fontsize=10)
     _draw_map(estimated, selector, observer, attempts, number)
-    draw_goal(external, look.external, look.goal, observer.cameras.ball_radius_m)
+    draw_goal(external, belief.external, belief.goal, observer.cameras.ball_radius_m)
     external.set_title(f"external camera: {external.get_title()}", fontsize=10)
     return figure
 
@@ -60,9 +60,9 @@ def _draw_map(
     belief, attempt = observer.belief(number - 1), attempts[number - 1]
     objective = selector.objective(situation_before(attempts, number, belief.starts))
     values = belief.over_all(estimate_apertures(objective, belief.starts))
-    image, found = belief.look.head, belief.look.apertures
+    image, found = belief.head, belief.apertures
     draw_image(ax, image)
-    chosen = int(belief.index[nearest_aperture(belief.starts, attempt)])
+    chosen = int(belief.open_index[nearest_aperture(belief.starts, attempt)])
     draw_probabilities(ax, image.project(found.corners), values, chosen)
     ax.set_title(estimate_title(selector, number, attempt), fontsize=10)
 

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import imsave
 
 from lic_drake.perception.apertures import find_apertures
-from lic_drake.perception.cameras import disturbed_views, take_views
+from lic_drake.perception.cameras import take_views
 from lic_drake.perception.config import load_cameras
 from lic_drake.perception.goal import find_goal
 from lic_drake.perception.observer import board_of
@@ -20,6 +20,7 @@ from lic_drake.seeds import make_generator
 from lic_drake.show.detections import draw_apertures, draw_goal
 from lic_drake.show.figures import save_figure
 from scripts.common import make_parser, run_script
+from scripts.perception.errors import disturbed_views
 
 
 def main() -> None:
@@ -34,7 +35,7 @@ def main() -> None:
     p_WG = scenario.sample_goal("calibration", args.scene)
     rng = make_generator("calibration", "camera errors", args.scene)
     exact = take_views(instance, p_WG, cameras)
-    views = disturbed_views(exact, cameras, rng, rng)
+    views = disturbed_views(exact, cameras, rng)
     board = board_of(scenario)
     apertures = find_apertures(views.head, cameras.head.camera, board)
     goal = find_goal(views.external, cameras.external.camera, cameras.ball_radius_m)

@@ -11,9 +11,10 @@ from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import PerceptionError
 from lic_drake.intervals import wilson_interval
 from lic_drake.perception.apertures import STATES, find_apertures
-from lic_drake.perception.cameras import Views, disturbed_views, take_views
+from lic_drake.perception.cameras import Views, take_views
 from lic_drake.perception.config import CamerasConfig
 from lic_drake.perception.goal import find_goal
+from lic_drake.perception.image import disturbed_image
 from lic_drake.perception.observer import board_of
 from lic_drake.reach.scenario import Scenario
 from lic_drake.seeds import make_generator
@@ -79,6 +80,14 @@ def true_states(board: ApertureBoard, instance: ClutterInstance) -> tuple[str, .
     return tuple(states)
 
 
+def disturbed_views(views: Views, cameras: CamerasConfig, rng: np.random.Generator) -> Views:
+    """Returns both images with the cameras' errors."""
+    return Views(
+        disturbed_image(views.head, cameras.head.camera, rng),
+        disturbed_image(views.external, cameras.external.camera, rng),
+    )
+
+
 def measure_scene(
     scenario: Scenario, cameras: CamerasConfig, scene: int
 ) -> tuple[list[ApertureError], list[GoalError]]:
@@ -91,7 +100,7 @@ def measure_scene(
     p_WG = scenario.sample_goal("evaluation", scene)
     exact = take_views(instance, p_WG, cameras)
     rng = make_generator("evaluation", "camera errors", scene)
-    noisy = disturbed_views(exact, cameras, rng, rng)
+    noisy = disturbed_views(exact, cameras, rng)
     apertures, goals = [], []
     for noise, views in ((False, exact), (True, noisy)):
         apertures += _aperture_errors(scenario, instance, cameras, views, scene, noise)

@@ -7,7 +7,7 @@ from lic_drake.errors import PerceptionError
 from lic_drake.perception.cameras import take_views
 from lic_drake.perception.config import CameraConfig, CamerasConfig, ExternalConfig, HeadConfig
 from lic_drake.perception.image import disturbed_image
-from lic_drake.perception.observer import Observer, board_of, estimate_board
+from lic_drake.perception.observer import Observer, board_of, starts_at
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.seeds import make_generator
 
@@ -33,7 +33,7 @@ def observer() -> Observer:
 def test_each_look_has_its_own_errors(observer: Observer) -> None:
     exact = take_views(SCENARIO.sample_instance("training", 0), P_WG, CAMERAS)
     for number in (1, 0):
-        look = observer.belief(number).look
+        look = observer.belief(number)
         for image, true, camera in ((look.head, exact.head, 0), (look.external, exact.external, 1)):
             rng = make_generator("training", "camera errors", 0, 2 * number + camera)
             expected = disturbed_image(true, CAMERA, rng)
@@ -50,34 +50,29 @@ def test_a_ball_out_of_view_is_refused() -> None:
 
 
 def test_the_robot_believes_what_it_saw(observer: Observer) -> None:
-    look = observer.belief(0).look
-    belief = estimate_board(SCENARIO, look)
-    np.testing.assert_array_equal(belief.p_WG, look.goal.p_WG)
-    starts = belief.starts
+    belief = observer.belief(0)
+    seen = belief.apertures
+    starts, index = starts_at(SCENARIO, seen)
     # The board is where it was seen, not where it is.
     board = board_of(SCENARIO)
-    shift = starts.board.aperture_centres().mean(axis=0) - look.apertures.p_WA.mean(axis=0)
+    shift = starts.board.aperture_centres().mean(axis=0) - seen.p_WA.mean(axis=0)
     np.testing.assert_allclose(shift, 0.0, atol=1e-9)
     assert np.linalg.norm(starts.board.aperture_centres()[0] - board.aperture_centres()[0]) > 1e-4
     # Open are those that seem so, and all others have a cover.
-    assert set(belief.index) == set(np.flatnonzero(look.apertures.probability_open > 0.5))
-    assert starts.instance.num_objects == board.bare_board().num_objects + 20 - len(belief.index)
+    np.testing.assert_array_equal(index, np.flatnonzero(seen.probability_open > 0.5))
+    assert starts.instance.num_objects == board.bare_board().num_objects + 20 - len(index)
     x0 = starts.grid.x0
     nearest = np.argmin(np.linalg.norm(x0[:, None, :3] - starts.p_WA, axis=2), axis=1)
-    chance = look.apertures.probability_open[belief.index][nearest]
-    np.testing.assert_allclose(starts.chance(x0), chance)
-    everywhere = belief.over_all(np.arange(len(belief.index), dtype=float))
-    np.testing.assert_array_equal(everywhere[belief.index], np.arange(len(belief.index)))
-    assert np.isnan(everywhere).sum() == 20 - len(belief.index)
-    still = observer.belief(0).starts  # Its base may not move.
-    assert len(np.unique(still.grid.b0, axis=0)) == 1
+    np.testing.assert_allclose(starts.chance(x0), seen.probability_open[index][nearest])
+    everywhere = belief.over_all(np.arange(len(index), dtype=float))
+    np.testing.assert_array_equal(everywhere[index], np.arange(len(index)))
+    assert np.isnan(everywhere).sum() == 20 - len(index)
+    assert len(np.unique(belief.starts.grid.b0, axis=0)) == 1  # Its base may not move.
 
 
 def test_a_board_that_seems_shut_or_far_away_is_refused(observer: Observer) -> None:
-    look = observer.belief(0).look
-    shut = replace(look, apertures=replace(look.apertures, probability_open=np.zeros(20)))
+    seen = observer.belief(0).apertures
     with pytest.raises(PerceptionError, match="none of 20 apertures looks open"):
-        estimate_board(SCENARIO, shut)
-    away = replace(look, apertures=replace(look.apertures, p_WA=look.apertures.p_WA + 0.5))
+        starts_at(SCENARIO, replace(seen, probability_open=np.zeros(20)))
     with pytest.raises(PerceptionError, match="at an impossible place"):
-        estimate_board(SCENARIO, away)
+        starts_at(SCENARIO, replace(seen, p_WA=seen.p_WA + 0.5))

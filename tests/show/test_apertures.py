@@ -23,8 +23,7 @@ FOUND = DetectedApertures(
     p_WA=CENTRES,
     covariance=np.zeros((3, 3, 3)),
     corners=CORNERS,
-    covered=np.array([0.0, 0.5, 1.0]),
-    seen=np.ones(3),
+    states=("open", "partly", "blocked"),
     probability_open=np.array([1.0, 0.25, 0.0]),
 )
 
@@ -73,7 +72,7 @@ def test_detected_apertures_are_outlined_in_the_colour_of_their_state() -> None:
 def test_a_detected_goal_is_drawn_as_the_ball_and_two_standard_deviations() -> None:
     # 1 cm along the image's x, that is along -Wy, and 2 cm along its y.
     covariance = np.diag([0.0, 0.01**2, 0.02**2])
-    goal = DetectedGoal(p_WG=np.array([1.5, 0.3, 1.2]), covariance=covariance, num_pixels=100)
+    goal = DetectedGoal(p_WG=np.array([1.5, 0.3, 1.2]), covariance=covariance)
     ax = draw_goal(Figure().subplots(), IMAGE, goal, 0.03)
     ball, ellipse = (patch for patch in ax.patches if isinstance(patch, Ellipse))
     scale = IMAGE.focal_px / 1.5
