@@ -20,13 +20,12 @@ from support.worlds import box, cylinder, make_clutter
 
 from lic_drake.control.mpc import HapticMpc
 from lic_drake.evaluate.trial import random_requests
-from lic_drake.reach import environment
+from lic_drake.reach import sleeping
 from lic_drake.reach.diagram import ReachDiagram, make_reach_diagram
 from lic_drake.reach.environment import Environment
 from lic_drake.reach.request import ReachRequest
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.session import ReachSession
-from lic_drake.reach.sleeping import waking
 from lic_drake.show.recording import Recording
 from lic_drake.starts import board_starts
 
@@ -46,8 +45,7 @@ def built(monkeypatch: pytest.MonkeyPatch) -> list["weakref.ref[Any]"]:
         references.extend(weakref.ref(item) for item in (reach_diagram.diagram, *systems))
         return reach_diagram
 
-    for module in (environment, waking):
-        monkeypatch.setattr(module, "make_reach_diagram", make)
+    monkeypatch.setattr(sleeping, "make_reach_diagram", make)
     return references
 
 

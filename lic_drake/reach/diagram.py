@@ -41,20 +41,15 @@ class ReachDiagram:
         self.diagram.GetInputPort("goal").FixValue(context, p_RG)
 
     def make_simulator(self, context: Context | None = None) -> Simulator:
-        """Returns a simulator with the scenario's integrator, see `make_simulator`.
+        """Returns a simulator with the scenario's integrator, by default of a new context.
 
         A plain `Simulator(diagram)` would integrate a continuous plant by Runge-Kutta instead.
-
-        Args:
-            context: A context of the diagram; by default a new one.
         """
         return make_simulator(self.diagram, self.config, context)
 
 
 def make_reach_diagram(
-    scenario: Scenario,
-    instance: ClutterInstance,
-    height_m: float | None = None,
+    scenario: Scenario, instance: ClutterInstance, height_m: float | None = None
 ) -> ReachDiagram:
     """Builds the diagram of one environment.
 
@@ -67,34 +62,29 @@ def make_reach_diagram(
     builder = DiagramBuilder()
     arm = scenario.arm()
     layout = make_taxels(arm, scenario.scene.taxels_per_m)
-    scene = add_scene(
-        builder,
-        arm,
-        instance,
-        scenario.scene,
-        height_m=scenario.task.torso_m if height_m is None else height_m,
-    )
+    height_m = scenario.task.torso_m if height_m is None else height_m
+    scene = add_scene(builder, arm, instance, scenario.scene, height_m=height_m)
     plant = scene.plant
     plant.set_name("plant")
-
     sensor = TactileSensor(arm, layout, scene.skin_links, scene.body)
     builder.AddNamedSystem("sensor", sensor)
-    builder.Connect(plant.get_contact_results_output_port(), sensor.GetInputPort("contact_results"))
-    builder.Connect(plant.get_state_output_port(scene.arm), sensor.GetInputPort("arm_state"))
-
     controller = HapticMpcController(arm, layout, scenario.mpc)
     builder.AddNamedSystem("controller", controller)
-    builder.Connect(plant.get_state_output_port(scene.arm), controller.GetInputPort("arm_state"))
-    builder.Connect(sensor.GetOutputPort("taxel_force"), controller.GetInputPort("taxel_force"))
-    builder.Connect(
-        controller.GetOutputPort("desired_state"), plant.get_desired_state_input_port(scene.arm)
-    )
-    builder.ExportInput(controller.GetInputPort("goal"), "goal")
 
-    builder.ExportOutput(plant.get_state_output_port(scene.arm), "arm_state")
-    builder.ExportOutput(plant.get_state_output_port(scene.clutter), "clutter_state")
-    builder.ExportOutput(sensor.GetOutputPort("taxel_force"), "taxel_force")
-    builder.ExportOutput(controller.GetOutputPort("desired_state"), "desired_state")
+    outputs = {
+        "arm_state": plant.get_state_output_port(scene.arm),
+        "clutter_state": plant.get_state_output_port(scene.clutter),
+        "taxel_force": sensor.GetOutputPort("taxel_force"),
+        "desired_state": controller.GetOutputPort("desired_state"),
+    }
+    builder.Connect(plant.get_contact_results_output_port(), sensor.GetInputPort("contact_results"))
+    builder.Connect(outputs["arm_state"], sensor.GetInputPort("arm_state"))
+    for name in ("arm_state", "taxel_force"):
+        builder.Connect(outputs[name], controller.GetInputPort(name))
+    builder.Connect(outputs["desired_state"], plant.get_desired_state_input_port(scene.arm))
+    builder.ExportInput(controller.GetInputPort("goal"), "goal")
+    for name, port in outputs.items():
+        builder.ExportOutput(port, name)
 
     diagram = builder.Build()
     diagram.set_name("reach")

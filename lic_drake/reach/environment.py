@@ -3,12 +3,10 @@
 import numpy as np
 
 from lic_drake.clutter.instance import ClutterInstance
-from lic_drake.reach.diagram import make_reach_diagram
 from lic_drake.reach.request import is_within_reach
 from lic_drake.reach.scenario import Scenario
-from lic_drake.reach.simulation import Cache, Simulated, Simulation, find_free, simulate
-from lic_drake.reach.sleeping.monitors import MovedTooFarError
-from lic_drake.reach.sleeping.waking import PartlyAsleep, World, make_sleeping
+from lic_drake.reach.simulation import Cache, Rig, Simulation, simulate
+from lic_drake.reach.sleeping import MovedTooFarError, World, make_sleeping
 from lic_drake.reach.start import Start
 from lic_drake.reach.trace import ReachResult, ReachTrace
 from lic_drake.robots.kinematics import rigid_pose
@@ -32,8 +30,7 @@ class Environment:
         instance: The clutter.
         sleep: Whether objects may sleep until the arm comes near (`lic_drake.reach.sleeping`);
             without, a reach costs three times as much and ends the same.
-        b0: Base position and torso height, (x, y, z), shape (3,), metres; by default at the origin
-            with the torso as the scenario's task has it.
+        b0: Base and torso, as of a `Start`; by default as the scenario's task has it.
         cache: Where diagrams are kept; by default its own.
 
     Raises:
@@ -46,26 +43,23 @@ class Environment:
         instance: ClutterInstance,
         sleep: bool = True,
         b0: Vector | None = None,
-        cache: Cache[Simulation] | None = None,
+        cache: Cache[Rig] | None = None,
     ) -> None:
         self.scenario = scenario
         self.instance = instance
         self.arm = scenario.arm()
         self.b0 = scenario.task.b0 if b0 is None else b0
-        self._height_m = float(self.b0[2])
-        self.arm.check_height(self._height_m)
-        self._in_R = instance.translated(-self.b0)
-        self._cache: Cache[Simulation] = Cache(MAX_DIAGRAMS) if cache is None else cache
+        height_m = float(self.b0[2])
+        self.arm.check_height(height_m)
+        diagrams = Cache[Rig](MAX_DIAGRAMS) if cache is None else cache
+        self._world = World(scenario, instance.translated(-self.b0), height_m, diagrams)
         self._token = object()
-        self._sleeping: PartlyAsleep | None = None
-        if sleep:
-            world = World(scenario, self._in_R, self._height_m, self._cache)
-            self._sleeping = make_sleeping(world)
+        self._sleeping = make_sleeping(self._world) if sleep else None
 
     def reach(
         self, p_WG: Vector, x0: Vector, keep_states: bool = False, q: Vector | None = None
     ) -> ReachResult:
-        """Simulates a reach.
+        """Simulates a reach; a goal out of the arm's reach is known to fail without.
 
         Args:
             p_WG: Goal, shape (3,), metres.
@@ -74,9 +68,6 @@ class Environment:
             q: Joint angles to begin with, shape (m,), radians; by default the first of the arm's
                 configurations for x0, in its order of preference, in which it touches nothing
                 (paper III-E).
-
-        Returns:
-            How it ended. A goal out of the arm's reach is known to fail without simulating it.
         """
         p_RG, x0_R = p_WG - self.b0, Start(x0, self.b0).x0_R
         if not is_within_reach(self.scenario, p_RG):
@@ -91,7 +82,7 @@ class Environment:
                 "invalid_start", ReachTrace(), "no configuration within the joint limits"
             )
         result = self._reach_from(angles, p_RG, keep_states)
-        result.trace.translate(self.b0, objects_too=self.instance.stems is None)
+        result.trace.translate(self.b0, clutter_too=self.instance.stems is None)
         return result
 
     def _reach_from(self, angles: Vector, p_RG: Vector, keep_states: bool) -> ReachResult:
@@ -102,18 +93,22 @@ class Environment:
                 pass  # Something moved too far at once: repeat the reach with all objects awake.
             finally:
                 self._sleeping.release()
-        awake = self._cache.get(self._token, self._build)
-        return self._reach_in(awake, angles, p_RG, keep_states)
+        awake = self._world.rig(self._token, self._world.instance)
+        return self._reach_in(Simulation(awake), angles, p_RG, keep_states)
 
     def _reach_in(
-        self, simulation: Simulated, angles: Vector, p_RG: Vector, keep_states: bool
+        self, simulation: Simulation, angles: Vector, p_RG: Vector, keep_states: bool
     ) -> ReachResult:
-        q0 = None if len(angles) == 1 else find_free(simulation, angles, p_RG)
-        q0 = angles[0] if q0 is None else q0
+        q0 = angles[0]
+        for q in angles if len(angles) > 1 else ():
+            simulation.begin(q, p_RG)
+            if not simulation.is_in_collision():
+                q0 = q
+                break
         result = simulate(simulation, self.scenario, q0, p_RG, keep_states)
         if result.trace.q:
-            p_WO = simulation.state().p_WO
-            result.trace.p_WO = p_WO if np.all(np.isfinite(p_WO)) else None
+            q_clutter = simulation.state().q_clutter
+            result.trace.q_clutter = q_clutter if np.all(np.isfinite(q_clutter)) else None
         return result
 
     def _is_at(self, q: Vector, x0_R: Vector) -> bool:
@@ -121,7 +116,3 @@ class Environment:
         pose, (p_RE, R_RE) = self.arm.calc_pose(q), rigid_pose(x0_R)
         error = max(np.abs(pose.p_RE - p_RE).max(), np.abs(pose.R_RE - R_RE).max())
         return bool(error <= START_TOLERANCE)
-
-    def _build(self) -> Simulation:
-        """Returns a simulation in which nothing sleeps."""
-        return Simulation(make_reach_diagram(self.scenario, self._in_R, self._height_m))

@@ -4,13 +4,13 @@ import hashlib
 import json
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
 from lic_drake.errors import RequestError
 from lic_drake.reach.scenario import Scenario
-from lic_drake.reach.start import IN_PLANE, IN_SPACE, POSE_AXES, Start
+from lic_drake.reach.start import IN_PLANE, IN_SPACE, POSE_AXES, Start, Starts
 from lic_drake.robots.arm import Arm
 from lic_drake.types import Vector
 
@@ -49,19 +49,16 @@ class ReachRequest:
 
     def __post_init__(self) -> None:
         goal = np.array(self.goal, dtype=float)
-        if goal.shape != (3,) or not np.all(np.isfinite(goal)):
-            raise RequestError(f"a goal is three finite numbers in metres, got {goal.tolist()}")
+        _check_point(goal)
         goal.flags.writeable = False
         object.__setattr__(self, "goal", goal)
         object.__setattr__(self, "start", _checked(self.scenario, self.start))
         object.__setattr__(self, "after", tuple(_checked(self.scenario, x) for x in self.after))
 
     def __eq__(self, other: object) -> bool:
-        """Returns whether another request has the same key."""
         return isinstance(other, ReachRequest) and self.key == other.key
 
     def __hash__(self) -> int:
-        """Returns the hash of the key."""
         return hash(self.key)
 
     @cached_property
@@ -70,11 +67,8 @@ class ReachRequest:
         return self._key(self.scenario.digest)
 
     def _key(self, digest: str) -> str:
-        """Returns the key for a scenario with a digest.
-
-        Quaternions and joint angles carry noise of 1e-17 that differs between machines: in space
-        nine digits count.
-        """
+        # Quaternions and joint angles carry noise of 1e-17 that differs between machines: in space
+        # nine digits count.
         x0, b0 = _significant(self.start.x0), self.start.b0.tolist()
         content: list[object] = [digest, self.stream, self.environment, self.goal.tolist(), x0]
         # Left out where the base stands at the origin, as in a library of a fixed base.
@@ -90,7 +84,7 @@ class ReachRequest:
 
     @classmethod
     def from_record(cls, record: "ReachRecord", scenario: Scenario) -> Self:
-        """Returns the request that a record answers; `scenario` is the one that it was made with.
+        """Returns the request that a record of a scenario answers.
 
         A record holds the joint angles in any case; its key tells whether they were prescribed.
         """
@@ -115,7 +109,6 @@ class ReachRequest:
 
 
 def _significant(x0: Vector) -> list[float]:
-    """Returns the numbers of a hand pose that tell it from others."""
     return x0.tolist() if len(x0) == IN_PLANE else _rounded(x0)
 
 
@@ -123,12 +116,13 @@ def _rounded(values: Vector) -> list[float]:
     return (np.round(values, 9) + 0.0).tolist()
 
 
-def _checked(scenario: Scenario, start: Start) -> Start:
-    """Returns a start of the scenario's robot, without joint angles where there are no others.
+def _check_point(goal: Vector) -> None:
+    if goal.shape != (3,) or not np.all(np.isfinite(goal)):
+        raise RequestError(f"a goal is three finite numbers in metres, got {goal.tolist()}")
 
-    Raises:
-        RequestError: It is of another kind of robot.
-    """
+
+def _checked(scenario: Scenario, start: Start) -> Start:
+    """Returns a start of the scenario's robot, without joint angles where there are no others."""
     arm = scenario.arm()
     size = arm.pose_size
     if start.x0.shape != (size,):
@@ -140,7 +134,7 @@ def _checked(scenario: Scenario, start: Start) -> Start:
         return start
     if len(start.q) != arm.num_joints:
         raise RequestError(
-            f"{scenario.robot} has {len(arm.q_min)} joint angles, the start has {len(start.q)}"
+            f"{scenario.robot} has {arm.num_joints} joint angles, the start has {len(start.q)}"
         )
     if size == IN_PLANE:
         only = arm.solve_ik(start.x0_R)
@@ -167,100 +161,83 @@ def flat_starts(after: tuple[Start, ...]) -> tuple[float, ...]:
 def _read_after(record: "ReachRecord", angles: int) -> list[tuple[Start, ...]]:
     """Returns what the column `after` of a record can mean, without and with joint angles."""
     n = len(record.start.x0)
-    b0_size = 3 if n == IN_SPACE else 2
+    axes = 3 if n == IN_SPACE else 2
     numbers, found = np.array(record.after), []
-    for with_angles in (False, True):
-        width = n + b0_size + angles * with_angles
-        if len(numbers) % width == 0:
-            rows = numbers.reshape(-1, width)
-            b0 = np.zeros((len(rows), 3))
-            b0[:, :b0_size] = rows[:, n : n + b0_size]
-            q = [
-                row if np.all(np.isfinite(row)) and len(row) else None
-                for row in rows[:, n + b0_size :]
-            ]
-            found.append(tuple(map(Start, rows[:, :n], b0, q)))
+    for end in (n + axes, n + axes + angles):
+        if len(numbers) % end == 0:
+            rows = numbers.reshape(-1, end)
+            b0 = np.pad(rows[:, n : n + axes], ((0, 0), (0, 3 - axes)))
+            q = rows[:, n + axes :] if end > n + axes else None
+            found.append(tuple(Starts(rows[:, :n], b0, q)))
     return found
 
 
-def _in_space(unit: str, doc: str) -> float:
-    """Returns a column that is 0 in the plane."""
-    return field(default=0.0, metadata={"unit": unit, "doc": doc})
+def _column(unit: str, doc: str, **options: Any) -> Any:
+    return field(metadata={"unit": unit, "doc": doc}, **options)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ReachRecord:
     """One row of an experience library. SI units, radians, world frame W.
 
-    Every field but `wall_time_s` is a function of the request; that one is left out when
-    records are compared. Where a reach never began (`invalid_start`,
-    `unreachable`), measured fields are NaN.
+    Every field but `wall_time_s`, which is not compared, is a function of the request. Where a
+    reach never began (`invalid_start`, `unreachable`), measured fields are NaN.
     """
 
-    key: str = field(metadata={"unit": "", "doc": "key of the request"})
-    category: str = field(metadata={"unit": "", "doc": "clutter category"})
-    robot: str = field(metadata={"unit": "", "doc": "robot"})
-    scenario: str = field(metadata={"unit": "", "doc": "digest of the scenario"})
-    stream: str = field(metadata={"unit": "", "doc": "seed stream of the environment"})
-    environment: int = field(metadata={"unit": "", "doc": "index in the stream"})
-    goal_x: float = field(metadata={"unit": "m", "doc": "goal p_WG"})
-    goal_y: float = field(metadata={"unit": "m", "doc": "goal p_WG"})
-    goal_z: float = field(metadata={"unit": "m", "doc": "goal p_WG"})
-    start_x: float = field(metadata={"unit": "m", "doc": "start pose x0"})
-    start_y: float = field(metadata={"unit": "m", "doc": "start pose x0"})
-    start_phi: float = field(metadata={"unit": "rad", "doc": "start pose x0"})
-    outcome: str = field(metadata={"unit": "", "doc": "one of OUTCOMES"})
-    success: bool = field(metadata={"unit": "", "doc": "outcome is reached"})
-    final_x: float = field(metadata={"unit": "m", "doc": "final hand pose x_inf"})
-    final_y: float = field(metadata={"unit": "m", "doc": "final hand pose x_inf"})
-    final_phi: float = field(metadata={"unit": "rad", "doc": "final hand pose x_inf"})
-    final_vx: float = field(
-        metadata={"unit": "m/s", "doc": "mean tip velocity of the last second of motion"}
-    )
-    final_vy: float = field(
-        metadata={"unit": "m/s", "doc": "mean tip velocity of the last second of motion"}
-    )
-    min_distance: float = field(metadata={"unit": "m", "doc": "smallest distance tip to goal"})
-    peak_force: float = field(metadata={"unit": "N", "doc": "largest taxel force"})
-    mean_force: float = field(
-        metadata={"unit": "N", "doc": "mean force of the loaded taxels over the reach"}
-    )
-    peak_contacts: int = field(metadata={"unit": "", "doc": "largest number of loaded taxels"})
-    mean_contacts: float = field(metadata={"unit": "", "doc": "mean number of loaded taxels"})
-    duration_s: float = field(metadata={"unit": "s", "doc": "simulated time"})
-    wall_time_s: float = field(compare=False, metadata={"unit": "s", "doc": "wall time"})
-    q_start: tuple[float, ...] = field(metadata={"unit": "rad", "doc": "first joint angles"})
-    q_final: tuple[float, ...] = field(metadata={"unit": "rad", "doc": "last joint angles"})
-    detail: str = field(metadata={"unit": "", "doc": "why a reach diverged or never began"})
-    lic_drake_version: str = field(metadata={"unit": "", "doc": "version of lic_drake"})
-    drake_version: str = field(metadata={"unit": "", "doc": "version of Drake"})
-    base_x: float = field(default=0.0, metadata={"unit": "m", "doc": "base p_WR"})
-    base_y: float = field(default=0.0, metadata={"unit": "m", "doc": "base p_WR"})
-    after: tuple[float, ...] = field(
+    key: str = _column("", "key of the request")
+    category: str = _column("", "clutter category")
+    robot: str = _column("", "robot")
+    scenario: str = _column("", "digest of the scenario")
+    stream: str = _column("", "seed stream of the environment")
+    environment: int = _column("", "index in the stream")
+    goal_x: float = _column("m", "goal p_WG")
+    goal_y: float = _column("m", "goal p_WG")
+    goal_z: float = _column("m", "goal p_WG")
+    start_x: float = _column("m", "start pose x0")
+    start_y: float = _column("m", "start pose x0")
+    start_phi: float = _column("rad", "start pose x0")
+    outcome: str = _column("", "one of OUTCOMES")
+    success: bool = _column("", "outcome is reached")
+    final_x: float = _column("m", "final hand pose x_inf")
+    final_y: float = _column("m", "final hand pose x_inf")
+    final_phi: float = _column("rad", "final hand pose x_inf")
+    final_vx: float = _column("m/s", "mean tip velocity of the last second of motion")
+    final_vy: float = _column("m/s", "mean tip velocity of the last second of motion")
+    min_distance: float = _column("m", "smallest distance tip to goal")
+    peak_force: float = _column("N", "largest taxel force")
+    mean_force: float = _column("N", "mean force of the loaded taxels over the reach")
+    peak_contacts: int = _column("", "largest number of loaded taxels")
+    mean_contacts: float = _column("", "mean number of loaded taxels")
+    duration_s: float = _column("s", "simulated time")
+    wall_time_s: float = _column("s", "wall time", compare=False)
+    q_start: tuple[float, ...] = _column("rad", "first joint angles")
+    q_final: tuple[float, ...] = _column("rad", "last joint angles")
+    detail: str = _column("", "why a reach diverged or never began")
+    lic_drake_version: str = _column("", "version of lic_drake")
+    drake_version: str = _column("", "version of Drake")
+    base_x: float = _column("m", "base p_WR", default=0.0)
+    base_y: float = _column("m", "base p_WR", default=0.0)
+    after: tuple[float, ...] = _column(
+        "m, m, rad, m, m",
+        "x0, p_WR and, in space, torso of each reach that went before",
         default=(),
-        metadata={
-            "unit": "m, m, rad, m, m",
-            "doc": "x0, p_WR and, in space, torso of each reach that went before",
-        },
     )
-    torso: float = _in_space("m", "height of the torso")
-    start_z: float = _in_space("m", "start pose x0")
-    start_qw: float = _in_space("", "start pose x0, quaternion; all 0 in the plane")
-    start_qx: float = _in_space("", "start pose x0, quaternion")
-    start_qy: float = _in_space("", "start pose x0, quaternion")
-    start_qz: float = _in_space("", "start pose x0, quaternion")
-    final_z: float = _in_space("m", "final hand pose x_inf")
-    final_qw: float = _in_space("", "final hand pose x_inf, quaternion; all 0 in the plane")
-    final_qx: float = _in_space("", "final hand pose x_inf, quaternion")
-    final_qy: float = _in_space("", "final hand pose x_inf, quaternion")
-    final_qz: float = _in_space("", "final hand pose x_inf, quaternion")
-    final_vz: float = _in_space("m/s", "mean tip velocity of the last second of motion")
-    source: str = field(
-        default=SIMULATION, metadata={"unit": "", "doc": "who made the reach: simulation, a robot"}
+    torso: float = _column("m", "height of the torso", default=0.0)
+    start_z: float = _column("m", "start pose x0", default=0.0)
+    start_qw: float = _column("", "start pose x0, quaternion; all 0 in the plane", default=0.0)
+    start_qx: float = _column("", "start pose x0, quaternion", default=0.0)
+    start_qy: float = _column("", "start pose x0, quaternion", default=0.0)
+    start_qz: float = _column("", "start pose x0, quaternion", default=0.0)
+    final_z: float = _column("m", "final hand pose x_inf", default=0.0)
+    final_qw: float = _column(
+        "", "final hand pose x_inf, quaternion; all 0 in the plane", default=0.0
     )
-    weight: float = field(
-        default=1.0, metadata={"unit": "", "doc": "how many simulated reaches the row counts as"}
-    )
+    final_qx: float = _column("", "final hand pose x_inf, quaternion", default=0.0)
+    final_qy: float = _column("", "final hand pose x_inf, quaternion", default=0.0)
+    final_qz: float = _column("", "final hand pose x_inf, quaternion", default=0.0)
+    final_vz: float = _column("m/s", "mean tip velocity of the last second of motion", default=0.0)
+    source: str = _column("", "who made the reach: simulation, a robot", default=SIMULATION)
+    weight: float = _column("", "how many simulated reaches the row counts as", default=1.0)
 
     @property
     def in_space(self) -> bool:
@@ -290,17 +267,12 @@ class ReachRecord:
 
 
 def check_goal(scenario: Scenario, p_RG: Vector) -> None:
-    """Refuses goals that no reach could come to.
-
-    Args:
-        scenario: Robot and success distance.
-        p_RG: The goal, shape (3,), metres.
+    """Refuses goals, shape (3,), metres, that no reach could come to.
 
     Raises:
         RequestError: The goal is not finite or further away than the arm reaches.
     """
-    if p_RG.shape != (3,) or not np.all(np.isfinite(p_RG)):
-        raise RequestError(f"a goal is three finite numbers in metres, got {p_RG.tolist()}")
+    _check_point(p_RG)
     if not is_within_reach(scenario, p_RG):
         arm = scenario.arm()
         distance = np.linalg.norm(p_RG - arm.p_RS)
@@ -313,12 +285,7 @@ def check_goal(scenario: Scenario, p_RG: Vector) -> None:
 
 
 def is_within_reach(scenario: Scenario, p_RG: Vector) -> bool:
-    """Returns whether the straight arm could come near enough to a goal to succeed.
-
-    Args:
-        scenario: Robot and success distance.
-        p_RG: The goal, shape (3,), metres.
-    """
+    """Returns whether the straight arm could come near enough to a goal to succeed."""
     arm = scenario.arm()
     return float(np.linalg.norm(p_RG - arm.p_RS)) < _farthest_goal_m(arm, scenario)
 

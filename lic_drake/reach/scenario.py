@@ -60,9 +60,7 @@ class Scenario:
         return self.clutter.sample(make_generator(stream, self.category, environment))
 
     def sample_goal(self, stream: str, environment: int, index: int = 0) -> Vector:
-        """Returns the goal with this index for an environment, p_WG, shape (3,), metres.
-
-        It is drawn from the goal area, or, without one, the goal that the environment offers.
+        """Returns p_WG, shape (3,), metres: drawn from the goal area or, without one, as offered.
 
         Raises:
             RequestError: The environment does not offer that many goals.
@@ -84,13 +82,14 @@ class Scenario:
         that the environment offers.
         """
         area = self.task.goal_area
-        if area is not None:
-            if area.random_goals == 0:
-                return area.grid()
-            indices = range(area.random_goals)
-            return np.array([self.sample_goal(stream, environment, i) for i in indices])
-        p_WG = self.sample_instance(stream, environment).p_WG
-        return np.empty((0, 3)) if p_WG is None else p_WG[np.newaxis]
+        if area is None:
+            p_WG = self.sample_instance(stream, environment).p_WG
+            return np.empty((0, 3)) if p_WG is None else p_WG[np.newaxis]
+        if area.random_goals == 0:
+            return area.grid()
+        return np.array(
+            [self.sample_goal(stream, environment, i) for i in range(area.random_goals)]
+        )
 
 
 def to_dict(scenario: Scenario) -> dict[str, Any]:
@@ -109,10 +108,10 @@ def _identity(part: Any) -> dict[str, Any]:
 
 
 def load_scenario(name_or_path: str | Path, overrides: str = "") -> Scenario:
-    """Reads a scenario.
+    """Reads a shipped scenario by its name, or a YAML file by its path.
 
     Args:
-        name_or_path: Name of a shipped scenario ("cylinder-clutter") or a path to a YAML file.
+        name_or_path: For instance "cylinder-clutter" or "mine.yaml".
         overrides: YAML text merged over the file, for instance "{mpc: {preset: ijrr_2013}}".
 
     Raises:
@@ -120,8 +119,7 @@ def load_scenario(name_or_path: str | Path, overrides: str = "") -> Scenario:
     """
     path = Path(name_or_path)
     if path.suffix not in (".yaml", ".yml"):
-        # Reject path traversal in scenario names.
-        path = scenarios_dir() / f"{path.name}.yaml" if path.name == str(name_or_path) else Path()
+        path = scenarios_dir() / f"{name_or_path}.yaml"
     try:
         content = path.read_bytes()
     except (OSError, ValueError):  # A name with a null byte is a ValueError.
@@ -164,8 +162,7 @@ def parse_scenario(content: str | bytes, overrides: str = "", source: str = "sce
             f"{source}: task: goal_area cannot be null, because an environment of"
             f" {scenario.category} offers no goal; give its lower and upper corner"
         )
-    track = scenario.task.base
-    if track is not None and scenario.sample_instance("training", 0).p_WA is None:
+    if scenario.task.base and scenario.sample_instance("training", 0).p_WA is None:
         raise ScenarioError(
             f"{source}: task: a base that moves along a track needs apertures, and an environment"
             f" of {scenario.category} has none; leave task.base out"

@@ -2,9 +2,7 @@
 
 import gc
 import math
-from collections import OrderedDict
 from collections.abc import Callable, Hashable
-from typing import Protocol
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
@@ -17,19 +15,71 @@ from lic_drake.scene.collision import is_touching
 from lic_drake.types import Vector
 
 
-class Simulated(Protocol):
-    """What `simulate` needs: a `Simulation`, one with sleeping objects, or another engine's."""
+class Rig:
+    """A diagram and a context of it, used for one reach after another.
+
+    Creating a context costs as much as some ten control periods. `shown` is for who changes the
+    fixed objects.
+    """
+
+    def __init__(self, diagram: ReachDiagram) -> None:
+        self.diagram, self.scene, self.plant = diagram, diagram.scene, diagram.scene.plant
+        self.context = diagram.diagram.CreateDefaultContext()
+        self.plant_context = self.plant.GetMyMutableContextFromRoot(self.context)
+        self.taxel_force = diagram.diagram.GetOutputPort("taxel_force")
+        self.q_clutter_first = self.clutter_positions().copy()
+        self.shown: object = None
+
+    def clutter_positions(self) -> Vector:
+        """Returns the movable part of the clutter as in `SceneState.q_clutter`."""
+        q_clutter = self.plant.GetPositions(self.plant_context, self.scene.clutter)
+        return q_clutter.reshape(-1, self.scene.num_axes)
+
+    def state(self) -> SceneState:
+        """Returns the state of arm and clutter."""
+        plant, context, scene = self.plant, self.plant_context, self.scene
+        return SceneState(
+            q=plant.GetPositions(context, scene.arm),
+            v=plant.GetVelocities(context, scene.arm),
+            q_clutter=self.clutter_positions(),
+            v_clutter=plant.GetVelocities(context, scene.clutter).reshape(-1, scene.num_axes),
+        )
+
+    def set_state(self, state: SceneState) -> None:
+        """Sets the state of arm and clutter."""
+        plant, context, scene = self.plant, self.plant_context, self.scene
+        plant.SetPositions(context, scene.arm, state.q)
+        plant.SetVelocities(context, scene.arm, state.v)
+        plant.SetPositions(context, scene.clutter, state.q_clutter.ravel())
+        plant.SetVelocities(context, scene.clutter, state.v_clutter.ravel())
+
+
+class Simulation:
+    """What `simulate` runs: here all is simulated; what sleeps or another engine is a subclass."""
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig = rig
 
     def begin(self, q: Vector, p_RG: Vector) -> None:
-        """Puts the arm at rest at q and every object where the environment has it.
+        """Puts the arm at rest at q and everything movable where the environment has it.
 
         Args:
             q: Joint angles, shape (m,), radians.
             p_RG: Goal, shape (3,), metres.
         """
+        self._begin_in(self._rig, q, p_RG)
+
+    def _begin_in(self, rig: Rig, q: Vector, p_RG: Vector, time_s: float = 0.0) -> None:
+        self._rig, self._p_RG = rig, p_RG
+        rig.context.SetTime(time_s)
+        rig.diagram.set_start(rig.context, q, p_RG)
+        first = rig.q_clutter_first
+        rig.set_state(rig.state()._replace(q_clutter=first, v_clutter=np.zeros_like(first)))
+        self._simulator: Simulator | None = None
 
     def is_in_collision(self) -> bool:
         """Returns whether the arm touches anything."""
+        return is_touching(self._rig.scene, self._rig.context)
 
     def advance_to(self, time_s: float) -> None:
         """Simulates up to a time, without the control update of that instant.
@@ -37,108 +87,30 @@ class Simulated(Protocol):
         Raises:
             RuntimeError: Drake found no solution, or a system failed.
         """
-
-    def joint_angles(self) -> Vector:
-        """Returns the arm's q, shape (m,), radians."""
-
-    def taxel_force(self) -> Vector:
-        """Returns the sensor's reading, shape (num_taxels,), N."""
-
-    def state(self) -> SceneState:
-        """Returns the state of the arm and of all movable objects."""
-
-    def wake_near(self, q: Vector) -> None:
-        """Wakes what the arm at joint angles q may touch before the next control update."""
-
-
-class Simulation:
-    """The arm and the clutter of one diagram, used for one reach after another.
-
-    The context is kept, because creating one costs as much as some ten control periods.
-
-    Attributes:
-        diagram: The diagram.
-        context: Its context.
-        plant_context: That of the plant.
-        num_movable: Number of movable objects.
-        shown: Whose fixed objects the context has; for who changes them.
-    """
-
-    def __init__(self, diagram: ReachDiagram) -> None:
-        self.diagram = diagram
-        self.context = diagram.diagram.CreateDefaultContext()
-        scene = diagram.scene
-        self._plant, self._arm, self._clutter = scene.plant, scene.arm, scene.clutter
-        self.plant_context = scene.plant.GetMyMutableContextFromRoot(self.context)
-        self._num_axes = scene.num_axes
-        self._p_WO_first = self.object_positions().copy()
-        self.num_movable = len(self._p_WO_first)
-        self.shown: object = None
-        self._taxel_force = diagram.diagram.GetOutputPort("taxel_force")
-
-    def begin(self, q: Vector, p_RG: Vector, time_s: float = 0.0) -> None:
-        """Puts the arm at rest at q and every object where the environment has it.
-
-        Args:
-            q: Joint angles, shape (m,), radians.
-            p_RG: Goal, shape (3,), metres.
-            time_s: Time on the clock, seconds.
-        """
-        self.context.SetTime(time_s)
-        self.diagram.set_start(self.context, q, p_RG)
-        p_WO = self._p_WO_first
-        self.set_state(self.state()._replace(p_WO=p_WO, v_WO=np.zeros_like(p_WO)))
-        self._simulator: Simulator | None = None
-
-    def is_in_collision(self) -> bool:
-        """Returns whether the arm touches anything."""
-        return is_touching(self.diagram.scene, self.context)
-
-    def advance_to(self, time_s: float) -> None:
-        """Simulates up to a time, without the control update of that instant."""
         if self._simulator is None:
             # A new one, because an integrator's memory would make a reach depend on the one before.
-            self._simulator = self.diagram.make_simulator(self.context)
+            self._simulator = self._rig.diagram.make_simulator(self._rig.context)
             self._simulator.Initialize()
         self._simulator.AdvanceTo(time_s)
 
     def joint_angles(self) -> Vector:
         """Returns the arm's q, shape (m,), radians."""
-        return self._plant.GetPositions(self.plant_context, self._arm)
+        return self._rig.plant.GetPositions(self._rig.plant_context, self._rig.scene.arm)
 
     def taxel_force(self) -> Vector:
         """Returns the sensor's reading, shape (num_taxels,), N."""
-        return np.asarray(self._taxel_force.Eval(self.context))
-
-    def object_positions(self) -> Vector:
-        """Returns p_WO of the movable objects, shape (n, num_axes), metres."""
-        p_WO = self._plant.GetPositions(self.plant_context, self._clutter)
-        return p_WO.reshape(-1, self._num_axes)
+        return np.asarray(self._rig.taxel_force.Eval(self._rig.context))
 
     def state(self) -> SceneState:
-        """Returns the state of the arm and of the movable objects."""
-        plant, context = self._plant, self.plant_context
-        return SceneState(
-            q=plant.GetPositions(context, self._arm),
-            v=plant.GetVelocities(context, self._arm),
-            p_WO=plant.GetPositions(context, self._clutter).reshape(-1, self._num_axes),
-            v_WO=plant.GetVelocities(context, self._clutter).reshape(-1, self._num_axes),
-        )
-
-    def set_state(self, state: SceneState) -> None:
-        """Sets the state of the arm and of the movable objects."""
-        plant, context = self._plant, self.plant_context
-        plant.SetPositions(context, self._arm, state.q)
-        plant.SetVelocities(context, self._arm, state.v)
-        plant.SetPositions(context, self._clutter, state.p_WO.ravel())
-        plant.SetVelocities(context, self._clutter, state.v_WO.ravel())
+        """Returns the state of the arm and of everything movable, asleep or awake."""
+        return self._rig.state()
 
     def wake_near(self, q: Vector) -> None:
-        """Does nothing: every movable object is simulated."""
+        """Wakes what the arm at joint angles q may touch before the next control update."""
 
 
-class Cache[T]:
-    """The most recently used items, at most a number of them, by key.
+class Cache[T](dict[Hashable, T]):
+    """The most recently used items, at most `size` of them.
 
     Diagrams with Python systems are reference cycles, which only Python's collector frees: it runs
     when items are dropped, which happens to half of them at once.
@@ -146,52 +118,26 @@ class Cache[T]:
 
     def __init__(self, size: int) -> None:
         self.size = size
-        self._items = OrderedDict[Hashable, T]()
 
-    def __len__(self) -> int:
-        return len(self._items)
-
-    def get(self, key: Hashable, make: Callable[[], T]) -> T:
+    def obtain(self, key: Hashable, make: Callable[[], T]) -> T:
         """Returns the item of a key, made when it is missing."""
-        if key not in self._items:
-            item = make()  # Which may itself get others.
-            if len(self._items) >= self.size:
-                for _ in range((self.size + 1) // 2):
-                    self._items.popitem(last=False)
-                gc.collect()
-            self._items[key] = item
-        self._items.move_to_end(key)
-        return self._items[key]
-
-    def clear(self) -> None:
-        """Drops all items."""
-        self._items.clear()
-        gc.collect()
-
-
-def find_free(simulation: Simulated, angles: Vector, p_RG: Vector) -> Vector | None:
-    """Returns the first joint angles with which the arm touches nothing, shape (m,), or None.
-
-    Args:
-        simulation: The environment.
-        angles: Joint angles to try, shape (n, m), radians.
-        p_RG: Goal, shape (3,), metres.
-    """
-    for q in angles:
-        simulation.begin(q, p_RG)
-        if not simulation.is_in_collision():
-            return q
-    return None
+        item = self.pop(key) if key in self else make()  # Which may itself obtain others.
+        if len(self) >= self.size:
+            for old in list(self)[: (self.size + 1) // 2]:
+                del self[old]
+            gc.collect()
+        self[key] = item
+        return item
 
 
 def simulate(
-    simulation: Simulated,
+    simulation: Simulation,
     scenario: Scenario,
     q0: Vector,
     p_RG: Vector,
     keep_states: bool = False,
 ) -> ReachResult:
-    """Runs a simulation from rest at q0 until a stop rule ends it.
+    """Runs a simulation from rest at q0 until one of the scenario's stop rules ends it.
 
     Args:
         simulation: The environment.
@@ -202,12 +148,10 @@ def simulate(
     """
     arm, period_s = scenario.arm(), scenario.mpc.period_s
     simulation.begin(q0, p_RG)
-    if simulation.is_in_collision():
-        return ReachResult(
-            "invalid_start", ReachTrace(), "the arm touches the clutter at its start"
-        )
-    monitor = StopMonitor(scenario.stop, p_RG, period_s)
     trace = ReachTrace()
+    if simulation.is_in_collision():
+        return ReachResult("invalid_start", trace, "the arm touches the clutter at its start")
+    monitor = StopMonitor(scenario.stop, p_RG, period_s)
     step = 0
     while True:
         # Drake's own arithmetic for periodic events: no rounding error decides whether a sample

@@ -19,10 +19,6 @@ POSE_AXES = {
 """Names of the numbers of a hand pose, as in the columns of records."""
 
 
-def _origin() -> Vector:
-    return np.zeros(3)
-
-
 @dataclass(frozen=True, eq=False)
 class Start:
     """The initial condition of a reach. Equal if all numbers are; hashable; arrays are read-only.
@@ -40,7 +36,7 @@ class Start:
     """
 
     x0: Vector
-    b0: Vector = field(default_factory=_origin)
+    b0: Vector = field(default_factory=lambda: np.zeros(3))
     q: Vector | None = None
 
     def __post_init__(self) -> None:
@@ -65,27 +61,23 @@ class Start:
         return _shifted(self.x0[None], self.b0[None])[0]
 
     def __eq__(self, other: object) -> bool:
-        """Returns whether another start has the same numbers."""
-        return isinstance(other, Start) and self._numbers() == other._numbers()
+        return isinstance(other, Start) and self._bytes() == other._bytes()
 
     def __hash__(self) -> int:
-        """Returns the hash of its numbers."""
-        return hash(self._numbers())
+        return hash(self._bytes())
 
-    def _numbers(self) -> tuple[tuple[float, ...] | None, ...]:
-        q = None if self.q is None else tuple(self.q.tolist())
-        return tuple(self.x0.tolist()), tuple(self.b0.tolist()), q
+    def _bytes(self) -> tuple[bytes | None, ...]:
+        return tuple(None if x is None else x.tobytes() for x in (self.x0, self.b0, self.q))
 
 
 @dataclass(frozen=True, eq=False)
 class Starts:
-    """n initial conditions; see `Start`.
+    """n initial conditions, as in `Start`.
 
     Attributes:
-        x0: Hand poses in W, shape (n, 3) or (n, 7).
-        b0: Bases and torsos, shape (n, 3), metres.
-        q: Joint angles, shape (n, m), radians, rows of NaN where they are left to the arm; None if
-            they are all.
+        x0: Shape (n, 3) or (n, 7).
+        b0: Shape (n, 3).
+        q: Shape (n, m), rows of NaN where they are left to the arm; None if they are all.
     """
 
     x0: Vector
@@ -101,12 +93,10 @@ class Starts:
         return len(self.x0)
 
     def __getitem__(self, index: int) -> Start:
-        """Returns one of them."""
         q = None if self.q is None or np.isnan(self.q[index, 0]) else self.q[index]
         return Start(self.x0[index], self.b0[index], q)
 
     def __iter__(self) -> Iterator[Start]:
-        """Yields them one by one."""
         return (self[i] for i in range(len(self)))
 
     @property
@@ -125,14 +115,12 @@ class Starts:
     def join(self, other: "Starts") -> "Starts":
         """Returns these followed by others."""
         m = max(0 if some.q is None else some.q.shape[1] for some in (self, other))
+        q = [np.full((len(x), m), np.nan) if x.q is None else x.q for x in (self, other)]
         return Starts(
             np.vstack([self.x0, other.x0]),
             np.vstack([self.b0, other.b0]),
-            np.vstack([self._angles(m), other._angles(m)]) if m else None,
+            np.vstack(q) if m else None,
         )
-
-    def _angles(self, m: int) -> Vector:
-        return np.full((len(self), m), np.nan) if self.q is None else self.q
 
 
 def _shifted(x0: Vector, b0: Vector) -> Vector:

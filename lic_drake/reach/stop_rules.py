@@ -56,12 +56,10 @@ class StopMonitor:
         self.min_distance = np.inf
 
     def update(self, time_s: float, p_WE: Vector, peak_force: float) -> str | None:
-        """Takes a sample; returns the outcome if the reach ends with it, else None.
+        """Takes the largest taxel force, N, at a time and tip position p_WE, shape (3,), metres.
 
-        Args:
-            time_s: Simulated time, seconds.
-            p_WE: Tip position, shape (3,), metres.
-            peak_force: Largest taxel force of the sample, N.
+        Returns:
+            The outcome if the reach ends with this sample, else None.
         """
         self._recent.append(p_WE)
         distance = math.dist(p_WE, self._p_WG)
@@ -73,13 +71,11 @@ class StopMonitor:
         elif time_s - self._low_force_time_s >= self._config.force_time_s - 1e-9:
             return "force"
         if len(self._recent) == self._recent.maxlen:
-            moved = math.dist(self._recent[-1], self._recent[0])
-            if moved < self._config.stuck_distance_m:
+            if math.dist(self._recent[-1], self._recent[0]) < self._config.stuck_distance_m:
                 return "stuck"
         self._nearest.append(self.min_distance)
         if len(self._nearest) == self._nearest.maxlen:
-            progress = self._nearest[0] - self.min_distance
-            if progress < self._config.progress_m:
+            if self._nearest[0] - self.min_distance < self._config.progress_m:
                 return "stuck"
         if time_s >= self._config.timeout_s - 1e-9:
             return "timeout"

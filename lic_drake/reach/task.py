@@ -1,5 +1,6 @@
 """Where a reach may start and where its goals lie (paper IV-A)."""
 
+import itertools
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,20 +16,16 @@ MAX_GRID_STEPS = 1000
 
 @dataclass(kw_only=True)
 class StartLine:
-    """Hand poses x0 = (x, y, phi) on a segment between robot and clutter, in R.
-
-    The grid is the paper's: positions 0.1 m and orientations 30 degrees apart, of which the
-    arm's joint limits leave 21.
-    """
+    """Hand poses x0 = (x, y, phi) on a segment between robot and clutter, in R, with their grid."""
 
     # Distance of the segment from the base, metres. With the arm's joint limits only
     # 0.325..0.342 m leaves the paper's 21 (and 14) initial conditions.
     x_m: float = 0.335
-    # Ends of the segment and grid distance, metres (paper IV-A).
+    # Ends of the segment and grid distance, metres.
     y_min_m: float = -0.4
     y_max_m: float = 0.4
     y_step_m: float = 0.1
-    # Range of orientations and grid distance, degrees (paper IV-A).
+    # Range of orientations and grid distance, degrees.
     phi_min_deg: float = -90.0
     phi_max_deg: float = 90.0
     phi_step_deg: float = 30.0
@@ -40,28 +37,25 @@ class StartLine:
 
     @property
     def lower(self) -> Vector:
-        """Lower bounds of x0, shape (3,), metres and radians."""
+        """Lower bounds of x0, shape (3,)."""
         return np.array([self.x_m, self.y_min_m, np.deg2rad(self.phi_min_deg)])
 
     @property
     def upper(self) -> Vector:
-        """Upper bounds of x0, shape (3,), metres and radians."""
+        """Upper bounds of x0, shape (3,)."""
         return np.array([self.x_m, self.y_max_m, np.deg2rad(self.phi_max_deg)])
 
     def grid(self, arm: Arm) -> Vector:
-        """Returns the grid poses that the arm can take, shape (n, 3), metres and radians."""
+        """Returns the grid poses that the arm can take, shape (n, 3)."""
         y = _steps(self.y_min_m, self.y_max_m, self.y_step_m)
         phi = np.deg2rad(_steps(self.phi_min_deg, self.phi_max_deg, self.phi_step_deg))
-        poses = [np.array([self.x_m, yi, phi_i]) for yi in y for phi_i in phi]
-        return np.array([x0 for x0 in poses if len(arm.solve_ik(x0))])
+        poses = np.array([[self.x_m, yi, phi_i] for yi in y for phi_i in phi])
+        return poses[[len(arm.solve_ik(x0)) > 0 for x0 in poses]]
 
 
 @dataclass(kw_only=True)
 class GoalArea:
-    """Rectangle of goals p_WG with its training grid (paper: 0.4 x 0.8 m, 5 x 9 at 0.1 m).
-
-    In space it may be a box or an upright rectangle (paper: 0.6 x 0.4 m, 4 x 3 at 0.2 m).
-    """
+    """Rectangle or, in space, box of goals p_WG with its training grid."""
 
     # Corners (x, y) or (x, y, z) in W and grid distance, metres.
     lower: list[float] = field(default_factory=lambda: [0.45, -0.4])
@@ -82,11 +76,9 @@ class GoalArea:
 
     def grid(self) -> Vector:
         """Returns the grid goals, shape (n, 3), metres; x varies slowest."""
-        x, y, *heights = (
-            _steps(low, high, self.step_m) for low, high in zip(self.lower, self.upper, strict=True)
-        )
-        z = heights[0] if heights else np.zeros(1)
-        return np.array([[xi, yi, zi] for xi in x for yi in y for zi in z])
+        corners = zip(self.lower, self.upper, strict=True)
+        steps = [_steps(low, high, self.step_m) for low, high in corners]
+        return np.array(list(itertools.product(*steps, *[[0.0]] * (3 - len(steps)))))
 
     def sample(self, rng: np.random.Generator) -> Vector:
         """Draws a goal p_WG uniformly, shape (3,), metres."""
@@ -96,13 +88,12 @@ class GoalArea:
 
 @dataclass(kw_only=True)
 class BaseTrack:
-    """Where a mobile base may stand: on a segment along Wy through the origin (paper Fig. 3c).
+    """Where a mobile base may stand, on a segment along Wy (paper Fig. 3c), to reach by apertures.
 
-    The robot then reaches through apertures: the hand starts in the centre of one, and the start
-    line, which belongs to the robot's frame R, says which poses relative to the base are possible.
+    The hand starts in the centre of one; the start line says which poses are possible in R.
     """
 
-    # Ends of the segment for the base's origin, metres.
+    # Ends of the segment, metres.
     y_min_m: float = -0.6
     y_max_m: float = 0.6
     # A collection tries this many random starts at each aperture of an environment.
@@ -115,13 +106,9 @@ class BaseTrack:
 
 @dataclass(kw_only=True)
 class Stand:
-    """Where the base and the torso of a robot in space may be when it reaches.
+    """Where the base along Wy and the torso of a robot in space may be (paper IV-B)."""
 
-    They translate parallel to the environment's surface (paper IV-B): the base along Wy through
-    the origin, the torso along Wz.
-    """
-
-    # Ends of the segment for the base's origin, metres.
+    # Ends of the segment, metres.
     y_min_m: float = 0.0
     y_max_m: float = 0.0
     # Lowest and highest torso, metres.
@@ -134,20 +121,18 @@ class Stand:
     def __post_init__(self) -> None:
         _check_range("stand y_m", self.y_min_m, self.y_max_m, 0.1)
         _check_range("stand torso_m", self.torso_min_m, self.torso_max_m, 0.1)
-        for name, values, low, high in (
-            ("training_y_m", self.training_y_m, self.y_min_m, self.y_max_m),
-            ("training_torso_m", self.training_torso_m, self.torso_min_m, self.torso_max_m),
-        ):
-            if not values or not all(low <= value <= high for value in values):
-                raise ScenarioError(
-                    f"stand {name} must be numbers from {low} to {high}, one at least, got {values}"
-                )
+        ends = {
+            "training_y_m": (self.y_min_m, self.y_max_m),
+            "training_torso_m": (self.torso_min_m, self.torso_max_m),
+        }
+        check_numbers(self, ranges=ends)
+        if not self.training_y_m or not self.training_torso_m:
+            raise ScenarioError(f"stand: {' and '.join(ends)} need one number at least, got []")
 
     def for_training(self, environment: int) -> tuple[float, float]:
         """Returns the base's y and the torso's height in an environment of a library, metres."""
-        columns = len(self.training_y_m)
-        y_m = self.training_y_m[environment % columns]
-        return y_m, self.training_torso_m[environment // columns % len(self.training_torso_m)]
+        pairs = [(y, torso) for torso in self.training_torso_m for y in self.training_y_m]
+        return pairs[environment % len(pairs)]
 
 
 @dataclass(kw_only=True)

@@ -7,6 +7,9 @@ import numpy as np
 
 from lic_drake.types import Vector
 
+VELOCITY_WINDOW_S = 1.0
+"""Time over which the velocity at the end of a reach is averaged, seconds."""
+
 
 class SceneState(NamedTuple):
     """Where everything is at one instant, and how fast it moves.
@@ -14,16 +17,15 @@ class SceneState(NamedTuple):
     Attributes:
         q: Joint angles, shape (m,), radians.
         v: Joint velocities, shape (m,), rad/s.
-        p_WO: Positions of the movable objects along the axes in which they move, shape (n, 2) in
-            the plane and (n, 3) in space, metres; of stems the angles by which they are bent,
-            shape (n, 2), radians.
-        v_WO: Their velocities, of the same shape, m/s or rad/s.
+        q_clutter: Positions p_WO of the movable objects, shape (n, 2) in the plane and (n, 3) in
+            space, metres; of stems the angles by which they are bent, shape (n, 2), radians.
+        v_clutter: Their velocities, of the same shape, m/s or rad/s.
     """
 
     q: Vector
     v: Vector
-    p_WO: Vector
-    v_WO: Vector
+    q_clutter: Vector
+    v_clutter: Vector
 
 
 @dataclass(kw_only=True)
@@ -31,16 +33,15 @@ class ReachTrace:
     """Samples at the control rate, from the start to the end of a reach.
 
     Attributes:
-        time_s: Simulated times, seconds.
         q: Joint angles, each shape (m,), radians.
         p_WE: Tip positions, each shape (3,), metres.
         peak_force: Largest taxel force of each sample, N.
         total_force: Sum of the taxel forces, N.
         contacts: Number of loaded taxels.
         states: The state of the scene at each sample, if it was asked for.
-        p_WR: Position of R, b0, shape (3,), metres.
-        p_WO: Positions of the movable objects when the reach ended, shape (n, 2) or (n, 3), metres;
-            None where it never began or they are not finite.
+        b0: Position of R, shape (3,), metres.
+        q_clutter: As in `SceneState`, when the reach ended; None where it never began or is not
+            finite.
     """
 
     time_s: list[float] = field(default_factory=list)
@@ -50,8 +51,8 @@ class ReachTrace:
     total_force: list[float] = field(default_factory=list)
     contacts: list[int] = field(default_factory=list)
     states: list[SceneState] = field(default_factory=list)
-    p_WR: Vector = field(default_factory=lambda: np.zeros(3))
-    p_WO: Vector | None = None
+    b0: Vector = field(default_factory=lambda: np.zeros(3))
+    q_clutter: Vector | None = None
 
     def append(self, time_s: float, q: Vector, p_WE: Vector, taxel_force: Vector) -> None:
         """Adds a sample; `taxel_force` has shape (num_taxels,), N."""
@@ -62,20 +63,17 @@ class ReachTrace:
         self.total_force.append(float(taxel_force.sum()))
         self.contacts.append(int(np.count_nonzero(taxel_force)))
 
-    def translate(self, offset: Vector, objects_too: bool = True) -> None:
-        """Moves all positions by an offset, shape (3,), metres.
-
-        Args:
-            offset: Shape (3,), metres.
-            objects_too: Whether p_WO are positions; those of stems are angles.
-        """
+    def translate(self, offset: Vector, clutter_too: bool) -> None:
+        """Moves all positions by an offset, shape (3,), metres; stems' angles are none."""
         self.p_WE = [p_WE + offset for p_WE in self.p_WE]
-        self.p_WR = self.p_WR + offset
-        if not objects_too:
+        self.b0 = self.b0 + offset
+        if not clutter_too:
             return
-        self.states = [s._replace(p_WO=s.p_WO + offset[: s.p_WO.shape[1]]) for s in self.states]
-        if self.p_WO is not None:
-            self.p_WO = self.p_WO + offset[: self.p_WO.shape[1]]
+        self.states = [
+            s._replace(q_clutter=s.q_clutter + offset[: s.q_clutter.shape[1]]) for s in self.states
+        ]
+        if self.q_clutter is not None:
+            self.q_clutter = self.q_clutter + offset[: self.q_clutter.shape[1]]
 
     @property
     def mean_force(self) -> float:
@@ -83,19 +81,18 @@ class ReachTrace:
         loaded = sum(self.contacts)
         return sum(self.total_force) / loaded if loaded else 0.0
 
-    def final_velocity(self, still_s: float, window_s: float = 1.0) -> Vector:
+    def final_velocity(self, still_s: float) -> Vector:
         """Returns the mean tip velocity in the last second of motion, shape (3,), m/s.
 
         Args:
-            still_s: Length of the time at the end in which the tip stood still, seconds: the
-                stuck rule's for a reach that got stuck, else 0. The paper's final velocity would
-                otherwise always be nearly zero there.
-            window_s: Length of the window, seconds.
+            still_s: How long the tip stood still at the end, seconds: the stuck rule's time for a
+                reach that got stuck, else 0. The paper's final velocity would otherwise always be
+                nearly zero there.
         """
         times = np.array(self.time_s)
         end = max(times[-1] - still_s, times[0])
         last = int(np.searchsorted(times, end + 1e-9) - 1)
-        first = int(np.searchsorted(times, end - window_s - 1e-9))
+        first = int(np.searchsorted(times, end - VELOCITY_WINDOW_S - 1e-9))
         span = times[last] - times[first]
         if span <= 0.0:
             return np.zeros(3)
@@ -103,13 +100,7 @@ class ReachTrace:
 
 
 class ReachResult(NamedTuple):
-    """How a simulated reach ended.
-
-    Attributes:
-        outcome: One of `lic_drake.reach.request.OUTCOMES`.
-        trace: Its samples; empty when the reach never began.
-        detail: A remark on outcomes that need one, else empty.
-    """
+    """How a simulated reach ended: `lic_drake.reach.request.OUTCOMES`, samples and a remark."""
 
     outcome: str
     trace: ReachTrace

@@ -15,10 +15,9 @@ from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.perception.cameras import make_renderer
 from lic_drake.perception.config import CamerasConfig
 from lic_drake.perception.observer import Observer
-from lic_drake.reach.record import make_record
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.scenario import Scenario
-from lic_drake.reach.session import simulate_request
+from lic_drake.reach.session import make_record, simulate_request
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.registry import Selector, make_selector, needs_library

@@ -39,7 +39,7 @@ def film_frames(trial: ShownTrial, cameras: CamerasConfig) -> Iterator[NDArray[n
     step = max(1, round(trial.scenario.mpc.rate_hz / FRAMES_PER_SECOND))
     for trace in trial.traces:
         for state in trace.states[::step]:
-            place(scene, context, trace.p_WR, state.q, state)
+            place(scene, context, trace.b0, state.q, state)
             views = [take_color_image(sensor, context) for sensor in sensors]
             yield np.hstack(views)[::SHRINK, ::SHRINK]
 

@@ -98,7 +98,7 @@ def record_trial(trial: ShownTrial, drake_models: Path | None = None) -> Recordi
         if approach is not None and trace.q:
             if before is not None:
                 recording.retract(before)
-            recording.move_to(trace.p_WR, trace.q[0])
+            recording.move_to(trace.b0, trace.q[0])
             before = trace
         recording.add_reach(trace, trial.p_WG)
     return recording

@@ -104,7 +104,7 @@ class Recording:
         """
         self._draw_goal(p_WG)
         self._show_forces(True)
-        self._b0 = trace.p_WR
+        self._b0 = trace.b0
         begin = self._clock_s
         for k in range(0, len(trace.states), self._sample_step()):
             self._clock_s = begin + trace.time_s[k]

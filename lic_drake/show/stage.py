@@ -58,5 +58,5 @@ def place(
     v = np.zeros(len(q)) if state is None else state.v
     plant.SetVelocities(context, scene.arm, scene.robot.positions(np.zeros(3), v))
     if state is not None:
-        plant.SetPositions(context, scene.clutter, state.p_WO.ravel())
-        plant.SetVelocities(context, scene.clutter, state.v_WO.ravel())
+        plant.SetPositions(context, scene.clutter, state.q_clutter.ravel())
+        plant.SetVelocities(context, scene.clutter, state.v_clutter.ravel())

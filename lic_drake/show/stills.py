@@ -187,7 +187,7 @@ def save_stills(
         shots = [("start", "", 0), ("middle", "", hardest), ("end", "", last)]
         shots += [(view, view, last) for view in camera.views if view]
         for name, view, k in shots:
-            still = camera.take(view, trace.p_WR, trace.states[k])
+            still = camera.take(view, trace.b0, trace.states[k])
             caption = f"attempt {number}, {trace.time_s[k]:.1f} s"
             caption += f": {attempt.record.outcome}" if k == last else ""
             path = out / f"attempt{number}_{name}.png"

@@ -64,7 +64,7 @@ def draw_view(
         color = ATTEMPT_COLORS[i % len(ATTEMPT_COLORS)]
         if scenario.arm().is_planar:  # Before a board, the PR2's thick links would hide everything.
             for q, alpha in ((trace.q[0], 0.25), (trace.q[-1], 0.8)):
-                _draw_arm(ax, scenario.arm(), q, trace.p_WR, axes, color, alpha)
+                _draw_arm(ax, scenario.arm(), q, trace.b0, axes, color, alpha)
         path = np.array(trace.p_WE)[:, list(axes)]
         ax.plot(*path.T, color=color, lw=2.0, label=label, zorder=3)
     _draw_goal(ax, scenario, p_WG, axes)
@@ -86,9 +86,9 @@ def draw_snapshot(
         trace: Samples with their states.
         k: Index of the sample.
     """
-    _draw_objects(ax, instance.with_objects_at(trace.states[k].p_WO), TOP, 1.0)
+    _draw_objects(ax, instance.with_objects_at(trace.states[k].q_clutter), TOP, 1.0)
     _draw_starts(ax, make_starts(scenario, instance).grid, TOP)
-    _draw_arm(ax, scenario.arm(), trace.q[k], trace.p_WR, TOP, "0.35", 0.8)
+    _draw_arm(ax, scenario.arm(), trace.q[k], trace.b0, TOP, "0.35", 0.8)
     path = np.array(trace.p_WE[: k + 1])
     ax.plot(path[:, 0], path[:, 1], color="tab:blue", lw=1.0)
     _draw_goal(ax, scenario, p_WG, TOP)

@@ -1,4 +1,4 @@
-"""A reach under way in MuJoCo, with the methods of `lic_drake.reach.simulation.Simulation`.
+"""A reach under way in MuJoCo.
 
 Sensor maths, controller and stop rules are those of the package; only the physics is MuJoCo's.
 """
@@ -11,13 +11,14 @@ from lic_drake.control.mpc_controller import HapticMpcController
 from lic_drake.control.tactile_sensor import ContactPatch, calc_taxel_forces
 from lic_drake.control.taxels import make_taxels
 from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.simulation import Simulation
 from lic_drake.reach.trace import SceneState
 from lic_drake.types import Vector
 from scripts.mujoco.mujoco_scene import MujocoConfig, make_mujoco_scene
 
 
-class MujocoSimulation:
-    """The arm and the clutter of one environment, used for one reach after another."""
+class MujocoSimulation(Simulation):
+    """The arm and the clutter of one environment; replaces whatever is Drake's."""
 
     def __init__(self, scenario: Scenario, instance: ClutterInstance, config: MujocoConfig) -> None:
         self._arm = scenario.arm()
@@ -29,12 +30,7 @@ class MujocoSimulation:
         self._controller = HapticMpcController(self._arm, self._layout, scenario.mpc)
 
     def begin(self, q: Vector, p_RG: Vector) -> None:
-        """Puts the arm at rest at q and every object where the environment has it.
-
-        Args:
-            q: Joint angles, shape (m,), radians.
-            p_RG: Goal, shape (3,), metres.
-        """
+        """Puts the arm at rest at q and every object where the environment has it."""
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[self._joints] = q
         self.data.ctrl[:] = q

@@ -2,7 +2,6 @@
 
 import pytest
 
-from lic_drake.reach import session as module
 from lic_drake.reach.session import ReachSession
 
 
@@ -13,8 +12,6 @@ def sleep(request: pytest.FixtureRequest) -> bool:
 
 
 @pytest.fixture
-def session(sleep: bool, monkeypatch: pytest.MonkeyPatch) -> ReachSession:
-    """A session that has simulated nothing yet, in the place of the process's."""
-    made = ReachSession(sleep)
-    monkeypatch.setattr(module, "default_session", lambda _: made)
-    return made
+def session(sleep: bool) -> ReachSession:
+    """A session that has simulated nothing yet."""
+    return ReachSession(sleep)

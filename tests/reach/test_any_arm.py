@@ -36,8 +36,8 @@ def test_it_pushes_spheres_aside_and_feels_them(session: ReachSession) -> None:
     assert result.outcome == "reached"
     assert max(result.trace.contacts) > 0
     first = SCENARIO.sample_instance("training", 0)
-    assert result.trace.p_WO is not None
-    assert np.abs(result.trace.p_WO - first.p_WO[first.movable]).max() > 0.01
+    assert result.trace.q_clutter is not None
+    assert np.abs(result.trace.q_clutter - first.p_WO[first.movable]).max() > 0.01
 
 
 def test_a_goal_beyond_its_length_is_out_of_reach(session: ReachSession) -> None:

@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-from pydrake.multibody.tree import JointIndex
 from support.reaches import start_angles, start_context
 from support.worlds import box, cylinder, make_clutter
 
@@ -34,33 +33,6 @@ def test_the_exported_ports_have_the_documented_names_and_sizes(
         "taxel_force": num_taxels,
         "desired_state": 6,
     }
-
-
-def test_the_controllers_and_the_sensors_ports_fit_together(reach_diagram: ReachDiagram) -> None:
-    num_taxels = planar_taxels(SCENARIO.arm().skin).num_taxels
-    sizes = {
-        name: {
-            port.get_name(): port.size()
-            for ports, count in (
-                (system.get_input_port, system.num_input_ports()),
-                (system.get_output_port, system.num_output_ports()),
-            )
-            for port in (ports(i) for i in range(count))
-        }
-        for name in ("sensor", "controller")
-        if (system := reach_diagram.diagram.GetSubsystemByName(name))
-    }
-    # An abstract port has the size 0.
-    assert sizes == {
-        "sensor": {"contact_results": 0, "arm_state": 6, "taxel_force": num_taxels},
-        "controller": {"arm_state": 6, "taxel_force": num_taxels, "goal": 3, "desired_state": 6},
-    }
-
-
-def test_every_system_has_a_name_of_its_own(reach_diagram: ReachDiagram) -> None:
-    names = [system.get_name() for system in reach_diagram.diagram.GetSystems()]
-    assert sorted(names) == ["controller", "plant", "scene_graph", "sensor", "standstill"]
-    assert reach_diagram.diagram.get_name() == "reach"
 
 
 def test_all_systems_run(reach_diagram: ReachDiagram) -> None:
@@ -97,12 +69,3 @@ def test_contexts_share_nothing(reach_diagram: ReachDiagram) -> None:
     start_context(reach_diagram, q0 + 0.1, P_WG + 0.1)
     state = reach_diagram.diagram.GetOutputPort("arm_state").Eval(first)
     np.testing.assert_array_equal(state[:3], q0)
-
-
-def test_only_movable_objects_have_joints(reach_diagram: ReachDiagram) -> None:
-    scene = reach_diagram.scene
-    joints = [
-        scene.plant.get_joint(JointIndex(i)).name()
-        for i in scene.plant.GetJointIndices(scene.clutter)
-    ]
-    assert joints == ["object0_x", "object0_y"]

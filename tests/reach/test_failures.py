@@ -17,9 +17,6 @@ from lic_drake.scene import scene
 FREE = free_space()
 
 
-pytestmark = pytest.mark.usefixtures("session")
-
-
 class Failing(Simulator):
     """A simulator that fails after three control periods, in Drake's way."""
 

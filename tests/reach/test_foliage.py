@@ -34,10 +34,10 @@ def test_starts_lie_in_apertures_that_nothing_covers() -> None:
 
 def test_an_arm_pushes_stems_aside_and_feels_it(result: ReachResult) -> None:
     assert result.outcome in ("reached", "stuck", "timeout")
-    assert result.trace.p_WO is not None
+    assert result.trace.q_clutter is not None
     assert INSTANCE.stems is not None
-    assert result.trace.p_WO.shape == (np.count_nonzero(~INSTANCE.stems.fixed), 2)
-    bent = np.array([state.p_WO for state in result.trace.states])
+    assert result.trace.q_clutter.shape == (np.count_nonzero(~INSTANCE.stems.fixed), 2)
+    bent = np.array([state.q_clutter for state in result.trace.states])
     assert np.all(np.isfinite(bent))
     assert 0.05 < np.abs(bent).max() < 1.5
     touched = np.flatnonzero(result.trace.peak_force)
@@ -67,14 +67,14 @@ def test_stems_are_bent_the_same_wherever_the_base_stands(result: ReachResult) -
     # To rounding, which contact makes more of.
     for k in (0, 20, 40):
         np.testing.assert_allclose(there.trace.p_WE[k], result.trace.p_WE[k] + aside, atol=1e-6)
-        here, far = result.trace.states[k].p_WO, there.trace.states[k].p_WO
+        here, far = result.trace.states[k].q_clutter, there.trace.states[k].q_clutter
         np.testing.assert_allclose(far, here, atol=1e-6)
 
 
 def test_a_reach_ends_as_if_no_stem_had_slept(result: ReachResult) -> None:
     awake = Environment(SCENARIO, INSTANCE, sleep=False).reach(GOAL, X0, keep_states=True)
     assert awake.outcome == result.outcome
-    for name in ("q", "p_WO"):
+    for name in ("q", "q_clutter"):
         a, b = (
             np.array([getattr(state, name) for state in r.trace.states]) for r in (result, awake)
         )

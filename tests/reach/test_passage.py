@@ -5,36 +5,19 @@ import itertools
 
 import numpy as np
 import pytest
-import yaml
 from support.kinematics import only
 from support.worlds import ARM, corners, gap_to_boxes
 
 from lic_drake.errors import RequestError
-from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.paths import shipped_library
 from lic_drake.reach.environment import Environment
 from lic_drake.reach.request import ReachRequest, is_within_reach
-from lic_drake.reach.scenario import Scenario, load_scenario, parse_scenario, to_dict
+from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.session import run_reach
 from lic_drake.reach.start import Start
 
 SCENARIO = load_scenario("passage-clutter")
 STARTS = SCENARIO.task.start_line.grid(ARM)
 INSTANCES = [SCENARIO.sample_instance("training", index) for index in range(200)]
-
-
-def test_a_scenario_with_a_goal_area_is_still_the_one_of_the_shipped_library() -> None:
-    shipped = ExperienceLibrary(shipped_library("cylinder-clutter")).scenario()
-    assert shipped.digest == load_scenario("cylinder-clutter").digest
-
-
-def test_its_other_properties_are_those_of_cylinder_clutter() -> None:
-    mine, theirs = to_dict(SCENARIO), to_dict(load_scenario("cylinder-clutter"))
-    assert mine["task"]["start_line"].pop("phi_step_deg") == 45.0
-    assert theirs["task"]["start_line"].pop("phi_step_deg") == 30.0
-    assert mine["task"]["start_line"] == theirs["task"]["start_line"]
-    for section in ("robot", "scene", "mpc", "stop"):
-        assert mine[section] == theirs[section]
 
 
 def test_it_has_the_papers_14_starts() -> None:
@@ -98,20 +81,6 @@ def test_an_environment_offers_its_centre_as_the_only_goal() -> None:
         np.testing.assert_allclose(goals[0], instance.p_WO.mean(axis=0), atol=1e-15)
     with pytest.raises(RequestError, match="passage-clutter offers 1 goal, 2 were asked for"):
         SCENARIO.sample_goal("evaluation", 0, 1)
-
-
-def test_with_a_goal_area_its_goals_are_taken_instead() -> None:
-    area = "{task: {goal_area: {lower: [0.5, 0.0], upper: [0.6, 0.1], step_m: 0.1}}}"
-    scenario = load_scenario("passage-clutter", area)
-    assert scenario.goals("training", 3).shape == (4, 3)
-    goals = np.array([scenario.sample_goal("training", 3, index) for index in range(5)])
-    assert len(np.unique(goals, axis=0)) == 5
-    assert np.all((goals[:, :2] >= [0.5, 0.0]) & (goals[:, :2] <= [0.6, 0.1]))
-
-
-def test_a_scenario_without_a_goal_area_comes_back_from_its_values() -> None:
-    copy: Scenario = parse_scenario(yaml.safe_dump(to_dict(SCENARIO)))
-    assert copy == SCENARIO and copy.digest == SCENARIO.digest
 
 
 def test_a_reach_into_a_passage_is_recorded_and_depends_on_its_request_only() -> None:

@@ -24,11 +24,11 @@ def test_a_film_shows_what_the_cameras_see_from_where_the_robot_is() -> None:
     )
     instance, p_WG = scenario.sample_instance("training", 0), np.array([0.84, -0.1, 0.9])
     bent = SceneState(
-        q=RIGHT_ARM_AT_REST, v=np.zeros(7), p_WO=np.zeros((2, 2)), v_WO=np.zeros((2, 2))
+        q=RIGHT_ARM_AT_REST, v=np.zeros(7), q_clutter=np.zeros((2, 2)), v_clutter=np.zeros((2, 2))
     )
     looking, near = ReachTrace(), ReachTrace()
     for trace, x in ((looking, -1.0), (near, 0.0)):
-        trace.p_WR = np.array([x, -0.29, head.torso_m])
+        trace.b0 = np.array([x, -0.29, head.torso_m])
         trace.states.append(bent)
     trial = ShownTrial(
         scenario=scenario, instance=instance, p_WG=p_WG, attempts=[], traces=[looking, near]

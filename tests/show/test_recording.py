@@ -68,7 +68,7 @@ def test_the_frames_show_the_arm_where_it_was(recorded: tuple[list[ReachTrace], 
             tick = begin + 10 * k
             assert (tick in frames) != (tick - 1 in frames)
             frame = frames[tick] if tick in frames else frames[tick - 1]
-            expected = [*(link_origins(arm, q)[2] + trace.p_WR[:2]), 0.0]
+            expected = [*(link_origins(arm, q)[2] + trace.b0[:2]), 0.0]
             np.testing.assert_allclose(frame, expected, atol=1e-9)
         # The next reach begins at a whole second, after a pause.
         begin += TICKS_PER_SECOND * int(np.ceil(trace.time_s[-1] + PAUSE_S))

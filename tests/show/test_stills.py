@@ -16,8 +16,7 @@ from support.worlds import ARM, cylinder, make_clutter
 from lic_drake.errors import RenderingError
 from lic_drake.evaluate.trial import Attempt
 from lic_drake.perception.image import CameraImage
-from lic_drake.reach.record import make_record
-from lic_drake.reach.session import instance_of, simulate_request
+from lic_drake.reach.session import instance_of, make_record, simulate_request
 from lic_drake.reach.trace import ReachTrace, SceneState
 from lic_drake.robots.pr2 import Q_HOME
 from lic_drake.select.situation import Selection
@@ -115,7 +114,7 @@ def test_arrows_are_forces_to_scale_but_for_the_largest() -> None:
 
 
 def at_rest(q: np.ndarray, p_WO: np.ndarray) -> SceneState:
-    return SceneState(q=q, v=np.zeros(len(q)), p_WO=p_WO, v_WO=np.zeros_like(p_WO))
+    return SceneState(q=q, v=np.zeros(len(q)), q_clutter=p_WO, v_clutter=np.zeros_like(p_WO))
 
 
 def color_at(still: Still, p_WQ: np.ndarray) -> np.ndarray:
