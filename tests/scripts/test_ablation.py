@@ -31,18 +31,6 @@ def test_choices_of_the_best_score_share_ties() -> None:
     assert choices.mean(share)[0] == pytest.approx(100.0 * (3.0 * 0.5 + 1.0) / 4.0)
 
 
-def test_the_standard_error_is_that_of_independent_environments() -> None:
-    rng = np.random.default_rng(0)
-    environment = np.repeat(np.arange(40), 5)
-    means, errors = [], []
-    for _ in range(500):
-        values = (rng.random(200) < np.repeat(rng.uniform(0.2, 0.8, 40), 5)).astype(float)
-        mean, error = run.Choices(np.zeros((200, 1)), np.ones(200), environment).mean(values)
-        means.append(mean)
-        errors.append(error)
-    assert np.mean(errors) == pytest.approx(np.std(means), rel=0.1)
-
-
 class Spy:
     """Refuses to be asked about what it was fitted to."""
 

@@ -2,13 +2,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from matplotlib.figure import Figure
 from support.fake_reach import make_record
 
 from lic_drake.errors import LibraryError
 from lic_drake.evaluate import experiment
 from lic_drake.evaluate.experiment import Evaluation
-from lic_drake.evaluate.statistics import Count, count
+from lic_drake.evaluate.statistics import count
 from lic_drake.evaluate.trial import random_requests
 from lic_drake.evaluate.trials import TrialTable, read_trials
 from lic_drake.experience.store import ExperienceLibrary
@@ -16,7 +15,7 @@ from lic_drake.experience.workers import Workers
 from lic_drake.paths import shipped_library
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from scripts.real_experience import run as script
-from scripts.real_experience.run import REAL, Learned, draw_success, evaluate_learned, success_table
+from scripts.real_experience.run import REAL, Learned, evaluate_learned
 
 WRONG_SIDE_Y = 0.1
 
@@ -59,23 +58,3 @@ def test_records_of_weight_turn_a_selection_that_the_simulation_had_wrong(
     assert len(few.columns()["key"]) == 280
     with pytest.raises(LibraryError, match="holds 120 records, not 121"):
         evaluate_learned(Learned(records=121, weight=1.0), real, asked)
-
-
-def test_table_and_figure_show_every_point() -> None:
-    counts = {
-        Learned(records=0, weight=1.0): Count(20, 100),
-        Learned(records=100, weight=8.0): Count(35, 100),
-        Learned(records=100, weight=None): Count(25, 100),
-    }
-    table = success_table(counts, Count(22, 200))
-    assert [row[:3] for row in table.rows if row] == [
-        ("0", "1", "20.0"),
-        ("100", "8", "35.0"),
-        ("100", "no simulation", "25.0"),
-        ("random starts", "", "11.0"),
-    ]
-    ax = Figure().subplots()
-    draw_success(ax, counts, Count(22, 200))
-    lines = {container.get_label(): container.lines[0] for container in ax.containers}
-    assert lines["simulation and records of weight 8"].get_ydata().tolist() == [20.0, 35.0]
-    assert lines["real records only"].get_ydata().tolist() == [25.0]

@@ -6,7 +6,6 @@ from sklearn.metrics import log_loss as sklearn_log_loss
 from lic_drake.estimate.features import ExperienceRows
 from scripts.cross_validation.scores import (
     brier_score,
-    calibration_curve,
     hold_out_environments,
     log_loss,
     score,
@@ -82,16 +81,6 @@ def test_scores_equal_those_of_scikit_learn() -> None:
     p, f = rng.uniform(0.01, 0.99, 100), rng.integers(0, 2, 100).astype(float)
     assert log_loss(p, f) == pytest.approx(sklearn_log_loss(f, p))
     assert brier_score(p, f) == pytest.approx(brier_score_loss(f, p))
-
-
-def test_the_calibration_curve_counts_and_averages_each_bin() -> None:
-    p = np.array([0.05, 0.0, 0.95, 1.0, 0.5])
-    f = np.array([0.0, 1.0, 1.0, 1.0, 0.0])
-    low, middle, high = calibration_curve(p, f)
-    assert (low.low, low.high, low.count, low.observed) == (0.0, 0.1, 2, 0.5)
-    assert low.predicted == pytest.approx(0.025)
-    assert (middle.low, middle.count, middle.observed) == (0.5, 1, 0.0)
-    assert (high.high, high.count, high.observed) == (1.0, 2, 1.0)
 
 
 def test_selection_goes_to_the_best_score_within_environment_and_goal() -> None:

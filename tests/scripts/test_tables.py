@@ -7,11 +7,11 @@ from support.trial_rows import fill_records, make_rows
 
 from lic_drake.errors import LibraryError
 from lic_drake.evaluate.statistics import mcnemar
-from lic_drake.evaluate.trials import TrialTable, read_trials, write_trials
+from lic_drake.evaluate.trials import TrialTable, write_trials
 from lic_drake.reach.scenario import load_scenario
 from scripts.common import load_trials, write_tables
 from scripts.second_attempts.table import second_attempts_table
-from scripts.tables.figures import FIGURES, attempts_figure, calibration_figure, goals_figure
+from scripts.tables.figures import FIGURES, goals_figure
 from scripts.tables.run import foliage_table, oracle_table, paper_tables, pr2_table
 
 
@@ -116,25 +116,6 @@ def small_records(results: Path, category: str) -> Path:
     rows += make_rows("gp", ["1", "01", "00", "1"], goals=2)
     write_trials(results / category / "trials.parquet", rows)
     return results
-
-
-def test_attempts_go_as_far_as_trials_do_and_calibration_is_of_what_estimates(
-    tmp_path: Path,
-) -> None:
-    results = small_records(tmp_path, "passage-clutter")
-    path = results / "passage-clutter" / "trials.parquet"
-    (ax,) = attempts_figure(results, "passage-clutter").axes
-    rnd, gp = (container.lines[0].get_xydata() for container in ax.containers)
-    np.testing.assert_allclose(rnd, [[1, 25], [2, 50], [3, 75]])
-    np.testing.assert_allclose(gp, [[1, 50], [2, 75]])
-    first, second = calibration_figure(results, "passage-clutter").axes
-    assert [t.get_text() for t in first.get_legend().get_texts()] == ["LIC(GP), n = 4"]
-    assert [t.get_text() for t in second.get_legend().get_texts()] == ["LIC(GP), n = 2"]
-    longer = make_rows("rnd", ["00001", "1"], variant="five-attempts")
-    write_trials(path, [*read_trials(path), *longer])
-    (ax,) = attempts_figure(results, "passage-clutter").axes
-    (rnd,) = (container.lines[0].get_xydata() for container in ax.containers)
-    np.testing.assert_allclose(rnd, [[1, 50], [2, 50], [3, 50], [4, 50], [5, 100]])
 
 
 def test_the_goals_of_the_map_are_those_of_the_evaluation(tmp_path: Path) -> None:
