@@ -31,7 +31,6 @@ from lic_drake.select.registry import (
     check_method,
     make_selector,
     needs_library,
-    split_method,
 )
 
 SAY_S = 5.0
@@ -220,13 +219,10 @@ class _Strategies:
 
     def selector(self, method: str, environment: int, goal: int) -> Selector:
         """Returns the strategy for a trial."""
-        first, later = split_method(method)
-        if later is not None:
-            return FallbackSelector(
-                first=self.selector(first, environment, goal),
-                later=self.selector(later, environment, goal),
-                method=method,
-            )
+        parts = check_method(method)
+        if len(parts) > 1:
+            first, later = (self.selector(part, environment, goal) for part in parts)
+            return FallbackSelector(first=first, later=later, method=method)
         if method == "rnd":
             # A generator for each trial, independent of all others.
             rng = make_generator(self._plan.evaluation.stream, "rnd", environment, goal)

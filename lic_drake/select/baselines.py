@@ -17,12 +17,7 @@ OBJECT_RADIUS_M = {IN_PLANE: 0.01, IN_SPACE: 0.05}
 
 
 class Hand(NamedTuple):
-    """The last link, which comes first on the way to a goal.
-
-    Attributes:
-        length_m: Distance of the tip from the last joint, metres.
-        radius_m: Largest radius of its shapes, metres.
-    """
+    """The last link: distance of the tip from its joint, and its largest radius, metres."""
 
     length_m: float
     radius_m: float
@@ -38,20 +33,17 @@ class Hand(NamedTuple):
 def corridor_cost(x0: Vector, p_WG: Vector, hand: Hand) -> Vector:
     """Returns what the last link sweeps on the straight way to the goal, shape (n,).
 
-    Divided by the clutter's density it is the expected number of contacts, the paper's
-    "minimum-contact corridor": it grows with the distance to the goal and with the angle between
-    the hand and the way. The paper gives no formula; these are ours, with r = r_hand + r_object:
+    Times the clutter's density it is the expected number of contacts, the paper's "minimum-contact
+    corridor". The paper gives no formula; these are ours, with r = r_hand + r_object and the angle
+    delta between the hand and the way:
 
         in the plane  C = d (2 r + l s(delta)),  s = sin(delta) up to 90 degrees, else 1
         in space      C = d (pi r^2 + 2 r l s(delta))
 
     Args:
-        x0: Start poses, (x, y, phi), shape (n, 3), or position and quaternion, shape (n, 7).
+        x0: Start poses, shape (n, 3), or (n, 7) in space.
         p_WG: Goal, shape (3,), metres.
         hand: The last link.
-
-    Returns:
-        Cost, shape (n,), square metres, in space cubic metres.
     """
     in_plane = x0.shape[1] == IN_PLANE
     position = slice(0, 2 if in_plane else 3)
@@ -73,49 +65,34 @@ def corridor_cost(x0: Vector, p_WG: Vector, hand: Hand) -> Vector:
 
 @dataclass(frozen=True, kw_only=True)
 class RandomSelector:
-    """RND: any of the discrete starts, all equally likely; a retry takes any other one.
-
-    Attributes:
-        rng: Source of the draws.
-    """
+    """RND: any of the discrete starts, all equally likely; a retry takes any other one."""
 
     rng: np.random.Generator
     method: str = "rnd"
 
     def select(self, situation: Situation) -> Selection:
-        """Draws a start.
-
-        Raises:
-            RequestError: All have failed.
-        """
+        """Draws a start; a RequestError if all have failed."""
         began = time.perf_counter()
         choices = situation.starts.grid.take(situation.untried(situation.starts.grid))
         if len(choices) == 0:
             raise RequestError("all discrete starts have failed; no start is left to draw")
         start = choices[int(self.rng.integers(len(choices)))]
-        return Selection(
-            start=start, probability=None, method=self.method, seconds=time.perf_counter() - began
-        )
+        return Selection(start, None, self.method, time.perf_counter() - began)
 
 
 @dataclass(frozen=True, kw_only=True)
 class CostSelector:
     """COST: the discrete start with the smallest corridor cost, away from failed ones.
 
-    A mobile base and a torso add nothing to the corridor. In the plane, of equal ones that is taken
-    whose shoulder is nearest to the goal across x, where most of the arm's length is left for the
-    way in. A PR2 moves as little as it can: with its shoulder before the goal the forearm jams in
-    the aperture, and COST came to 9 % of the goals instead of 31 %.
+    Of equal ones, in the plane the shoulder is nearest to the goal across x, where most of the
+    arm's length is left for the way in. A PR2 moves as little as it can: with its shoulder before
+    the goal the forearm jams in the aperture, and COST came to 9 % of the goals instead of 31 %.
     """
 
     method: str = "cost"
 
     def select(self, situation: Situation) -> Selection:
-        """Returns the best start.
-
-        Raises:
-            RequestError: None is left.
-        """
+        """Returns the best start; a RequestError if none is left."""
         began = time.perf_counter()
         starts = situation.starts
         choices = starts.grid.take(situation.allowed(starts.grid))
@@ -128,6 +105,4 @@ class CostSelector:
             second = np.linalg.norm(choices.b0 - starts.home, axis=1)
         # Rounded: equal poses have equal costs but for the last digits.
         start = choices[int(np.lexsort([second, np.round(cost, 9)])[0])]
-        return Selection(
-            start=start, probability=None, method=self.method, seconds=time.perf_counter() - began
-        )
+        return Selection(start, None, self.method, time.perf_counter() - began)

@@ -2,6 +2,7 @@
 
 import time
 from collections import Counter
+from contextlib import suppress
 from itertools import product
 
 import numpy as np
@@ -10,24 +11,18 @@ from lic_drake.errors import EstimateError, RequestError
 from lic_drake.reach.start import Start, Starts
 from lic_drake.select.objective import Objective, SuccessModel, SuccessObjective
 from lic_drake.select.program import LicProgram
-from lic_drake.select.situation import FailedReach, Selection, Situation
+from lic_drake.select.situation import Selection, Situation
 from lic_drake.starts import Region, find_regions
 from lic_drake.types import Vector
 
-FIRST_STEP = 1.0 / 16.0
-"""First step of a pattern search, as a share of the region's width."""
-
-SMALLEST_STEP = 1e-6
-"""A pattern search ends at this share of the region's width."""
-
-MAX_TRIED = 40
-"""Number of candidates of a region that are tried, best first, until one is feasible."""
-
-LEAST_GAIN = 1e-9
-"""Smallest improvement that counts; less is rounding."""
-
-VIOLATED = 1e6
-"""Penalty of candidates that violate a constraint."""
+# First and last step of a pattern search, as shares of the region's width.
+_FIRST_STEP, _SMALLEST_STEP = 1.0 / 16.0, 1e-6
+# Number of candidates of a region that are tried, best first, until one is feasible.
+_MAX_TRIED = 40
+# Smallest improvement that counts; less is rounding.
+_LEAST_GAIN = 1e-9
+# Penalty of candidates that violate a constraint.
+_VIOLATED = 1e6
 
 
 class _Best:
@@ -44,25 +39,21 @@ class _Best:
             return
         asked, program = Starts.of(start), self._program
         value = float(program.values(asked)[0])
-        if value <= self.value + LEAST_GAIN or not program.satisfied(asked)[0]:
+        if value <= self.value + _LEAST_GAIN or not program.satisfied(asked)[0]:
             return
         if program.objective.failed or program.situation.allowed(asked)[0]:
             self.start, self.value = start, value
 
 
 def climb(program: LicProgram, region: Region, best: _Best) -> None:
-    """Improves a start by a pattern search over hand, base and torso within a region.
-
-    An L1 kernel and K-NN have kinks, on which a solver that follows gradients stops early.
-    """
+    """Improves a start by a pattern search over hand, base and torso within a region."""
     starts = program.situation.starts
-    widths = region.upper[:3] - region.lower[:3], region.b0_upper - region.b0_lower
-    width = np.concatenate(widths)
-    free = np.flatnonzero(width > SMALLEST_STEP)
+    width = np.append(region.upper[:3] - region.lower[:3], region.b0_upper - region.b0_lower)
+    free = np.flatnonzero(width > _SMALLEST_STEP)
     steps = np.zeros((3 ** len(free), 6))
     steps[:, free] = width[free] * list(product((-1.0, 0.0, 1.0), repeat=len(free)))
-    scale = FIRST_STEP
-    while best.start is not None and scale > SMALLEST_STEP:
+    scale = _FIRST_STEP
+    while best.start is not None and scale > _SMALLEST_STEP:
         before = best.value
         x0 = np.tile(best.start.x0, (len(steps), 1))
         x0[:, :3] += scale * steps[:, :3]
@@ -71,7 +62,7 @@ def climb(program: LicProgram, region: Region, best: _Best) -> None:
         b0 = np.clip(b0, region.b0_lower, region.b0_upper)
         values = program.values(Starts(x0, b0))
         for k in np.argsort(-values, kind="stable"):
-            if values[k] <= before + LEAST_GAIN or best.value > before:
+            if values[k] <= before + _LEAST_GAIN or best.value > before:
                 break
             q = starts.solve(x0[k], b0[k], near=best.start.q)
             best.consider(None if q is None else Start(x0[k], b0[k], q))
@@ -94,23 +85,11 @@ class LicSelector:
     def __init__(
         self, first: SuccessModel, second: SuccessModel | None = None, method: str = "lic"
     ) -> None:
-        """Sets up a selector.
-
-        Args:
-            first: LIC-1's fitted model.
-            second: LIC-2's, if there is one.
-            method: Name for the selections.
-        """
-        self.method = method
-        self.first = first
-        self.second = second
+        """Sets up a selector with LIC-1's fitted model and LIC-2's, if there is one."""
+        self.first, self.second, self.method = first, second, method
 
     def select(self, situation: Situation) -> Selection:
-        """Returns the best start found.
-
-        Raises:
-            RequestError: No start is left away from the failed ones.
-        """
+        """Returns the best start found; see `solve`."""
         return self.solve(self.program(situation))
 
     def program(self, situation: Situation) -> LicProgram:
@@ -125,52 +104,6 @@ class LicSelector:
                 satisfies what was added to the program.
         """
         began = time.perf_counter()
-        best = self._best(program)
-        probability = float(np.clip(program.estimates(Starts.of(best))[0], 0.0, 1.0))
-        seconds = time.perf_counter() - began
-        return Selection(start=best, probability=probability, method=self.method, seconds=seconds)
-
-    def objective(self, situation: Situation) -> SuccessObjective:
-        """Returns what is maximised in a situation."""
-        seen = self._observable(situation.failed)
-        if self.second is not None and seen:
-            return Objective(model=self.second, p_WG=situation.p_WG, failed=seen)
-        return Objective(model=self.first, p_WG=situation.p_WG)
-
-    def search(self, program: LicProgram) -> tuple[Starts, Vector]:
-        """Returns n candidates, the discrete starts first, and their values, shape (n,).
-
-        After those comes a lattice. Candidates without joint angles may be infeasible. The value of
-        a forbidden one is -inf.
-        """
-        starts = program.situation.starts
-        grid = starts.grid
-        of_grid = self._values(program, grid)
-        if np.all(of_grid == -np.inf):
-            return grid, of_grid
-        places = starts.lattice(of_grid)
-        return grid.join(places), np.append(of_grid, self._values(program, places))
-
-    def improve(self, program: LicProgram, region: Region, start: Start) -> Start | None:
-        """Returns where the optimisation ends from a start, None if the arm cannot be near there.
-
-        Args:
-            program: The optimisation.
-            region: A region that holds the start.
-            start: Where to begin, with joint angles.
-        """
-        best = _Best(program)
-        best.consider(start)
-        best.consider(program.situation.starts.snap(region, program.solve(region, start)))
-        climb(program, region, best)
-        return best.start
-
-    def _best(self, program: LicProgram) -> Start:
-        """Returns the best feasible start found.
-
-        Raises:
-            RequestError: There is none.
-        """
         situation, starts = program.situation, program.situation.starts
         effort, num_discrete = starts.effort, len(starts.grid)
         regions = starts.regions if program.objective.failed else situation.free_regions()
@@ -187,8 +120,8 @@ class LicSelector:
                 break
             region = int(region_of[k])
             if tried[region] == 0 and values[k] < best.value - effort.max_gain:
-                tried[region] = MAX_TRIED
-            if tried[region] >= MAX_TRIED or solved[region] >= effort.solves_per_region:
+                tried[region] = _MAX_TRIED
+            if tried[region] >= _MAX_TRIED or solved[region] >= effort.solves_per_region:
                 continue
             tried[region] += 1
             start: Start | None = candidates[int(k)]
@@ -206,29 +139,52 @@ class LicSelector:
                 "no start is left away from the failed ones that satisfies the constraints of the"
                 " program; loosen what was added to it"
             )
+        estimate = program.estimates(Starts.of(best.start))[0]
+        return Selection(
+            start=best.start,
+            probability=float(np.clip(estimate, 0.0, 1.0)),
+            method=self.method,
+            seconds=time.perf_counter() - began,
+        )
+
+    def objective(self, situation: Situation) -> SuccessObjective:
+        """Returns what is maximised in a situation."""
+        if self.second is not None:
+            seen = []
+            for reach in situation.failed:
+                with suppress(EstimateError):  # One that never began shows less than is asked for.
+                    self.second.features.observation(reach.shown)
+                    seen.append(reach)
+            if seen:
+                return Objective(model=self.second, p_WG=situation.p_WG, failed=tuple(seen))
+        return Objective(model=self.first, p_WG=situation.p_WG)
+
+    def search(self, program: LicProgram) -> tuple[Starts, Vector]:
+        """Returns n candidates, discrete starts and then a lattice, and their values, shape (n,).
+
+        Those without joint angles may be infeasible. The value of a forbidden one is -inf.
+        """
+        starts = program.situation.starts
+        grid = starts.grid
+        of_grid = self._values(program, grid)
+        if np.all(of_grid == -np.inf):
+            return grid, of_grid
+        places = starts.lattice(of_grid)
+        return grid.join(places), np.append(of_grid, self._values(program, places))
+
+    def improve(self, program: LicProgram, region: Region, start: Start) -> Start | None:
+        """Returns where the optimisation in a region ends from a start, if it is feasible."""
+        best = _Best(program)
+        best.consider(start)
+        best.consider(program.situation.starts.snap(region, program.solve(region, start)))
+        climb(program, region, best)
         return best.start
 
     def _values(self, program: LicProgram, candidates: Starts) -> Vector:
-        """Returns values of n candidates, shape (n,), -inf where they are ruled out.
-
-        What violates a constraint that was added comes after all others: a solver may still find
-        the way from there.
-        """
+        """Returns values of n candidates, shape (n,), -inf where they are ruled out."""
+        # From what violates a constraint that was added, after all others, a solver may find a way.
         violated = ~program.satisfied(candidates)
-        values = program.values(candidates) - VIOLATED * violated
+        values = program.values(candidates) - _VIOLATED * violated
         if not program.objective.failed:
             values[~program.situation.allowed(candidates)] = -np.inf
         return values
-
-    def _observable(self, failed: tuple[FailedReach, ...]) -> tuple[FailedReach, ...]:
-        """Returns the failures that show all that LIC-2 asks for: those that began at all."""
-        if self.second is None:
-            return ()
-        seen = []
-        for reach in failed:
-            try:
-                self.second.features.observation(reach.shown)
-            except EstimateError:
-                continue
-            seen.append(reach)
-        return tuple(seen)

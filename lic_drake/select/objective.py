@@ -28,15 +28,12 @@ class SuccessObjective(Protocol):
     @property
     def failed(self) -> tuple[FailedReach, ...]:
         """Failures that are observed; without any, starts near failed ones are ruled out."""
-        ...
 
     def values(self, conditions: Starts) -> Vector:
         """Returns the unclipped estimates at n initial conditions, shape (n,)."""
-        ...
 
     def value_and_gradient(self, x0: Vector, b0: Vector) -> tuple[float, Vector, Vector]:
         """Returns the estimate and its gradients by x0 and by b0, shape (3,)."""
-        ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,12 +41,7 @@ class Objective:
     """The estimated probability of success at a goal, after failed reaches.
 
     After several failures it is the smallest of the estimates that follow each of them: what one
-    failure speaks against, no other can recommend.
-
-    Attributes:
-        model: LIC-1's, or LIC-2's if there are failures to observe.
-        p_WG: Goal, shape (3,), metres.
-        failed: Failures that are observed; empty for a model without observed features.
+    failure speaks against, no other can recommend. Without any to observe the model is LIC-1's.
     """
 
     model: SuccessModel
@@ -58,32 +50,22 @@ class Objective:
 
     def values(self, conditions: Starts) -> Vector:
         """Returns the unclipped estimates at n initial conditions, shape (n,)."""
-        features = self.model.features
-        p_RG, x0 = self.p_WG - conditions.b0, conditions.in_R
-        if not self.failed:
-            return self.model.estimator.values(features.join(p_RG, x0))
-        estimates = []
-        for failed in self.failed:
-            seen = features.observation(failed.shown, conditions.b0)
-            estimates.append(self.model.estimator.values(features.join(p_RG, x0, seen)))
-        least: Vector = np.min(estimates, axis=0)
-        return least
+        p_RG, x0, join = self.p_WG - conditions.b0, conditions.in_R, self.model.features.join
+        seen = self._observed(conditions.b0)
+        values = [self.model.estimator.values(join(p_RG, x0, o)) for o in seen]
+        return np.array(values).min(axis=0)
 
     def value_and_gradient(self, x0: Vector, b0: Vector) -> tuple[float, Vector, Vector]:
-        """Returns the estimate and its gradients by x0 and by b0, shape (3,).
-
-        Args:
-            x0: Hand pose in W, shape (3,), or (7,) in space.
-            b0: Place of the base and height of the torso, shape (3,), metres.
-        """
-        features = self.model.features
-        x0_R = Start(x0, b0).x0_R
-        observed: list[Vector | None] = [None]
-        if self.failed:
-            observed = [features.observation(failed.shown, b0) for failed in self.failed]
+        """Returns the estimate and its gradients by x0 and by b0, shape (3,)."""
+        features, x0_R = self.model.features, Start(x0, b0).x0_R
         candidates = [
             self.model.estimator.value_and_gradient(features.join(self.p_WG - b0, x0_R, seen))
-            for seen in observed
+            for seen in self._observed(b0)
         ]
         value, by_z = min(candidates, key=lambda candidate: candidate[0])
         return value, features.gradient_by_x0(by_z), features.gradient_by_base(by_z)
+
+    def _observed(self, b0: Vector) -> list[Vector | None]:
+        if not self.failed:
+            return [None]
+        return [self.model.features.observation(failed.shown, b0) for failed in self.failed]

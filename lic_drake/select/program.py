@@ -27,24 +27,29 @@ from lic_drake.reach.start import IN_PLANE, Start, Starts
 from lic_drake.robots.arm import Arm
 from lic_drake.select.objective import SuccessObjective
 from lic_drake.select.situation import Situation
-from lic_drake.starts import FeasibleStarts, Region
+from lic_drake.starts import Region
 from lic_drake.types import BoolVector, Vector
 from lic_drake.weak_method import weakly
 
-UP = np.array([0.0, 0.0, 1.0])
-"""The axis of turns in the plane."""
-
 CLEARANCE_M = 0.001
 """The arm keeps this far from board and body, metres."""
+# Pairs further apart than this do not count, metres.
+_INFLUENCE_M = 0.02
+# Joint angles keep this far from their limits, so that what is rounded is still within them.
+_LIMIT_MARGIN_RAD = 1e-6
+# By how much a start may miss a constraint that somebody added, in the constraint's unit.
+_TOLERANCE = 1e-6
+_UP = np.array([0.0, 0.0, 1.0])
 
-LIMIT_MARGIN_RAD = 1e-6
-"""Joint angles keep this far from their limits, so that what is rounded is still within them."""
 
-INFLUENCE_M = 0.02
-"""Pairs further apart than this do not count, metres."""
-
-TOLERANCE = 1e-6
-"""By how much a start may miss a constraint that somebody added, in the constraint's unit."""
+# Kinks of an L1 kernel make solvers crawl or report failure at good points; the result is checked
+# anyway. With distances SNOPT gained most (NLopt's SLSQP two thirds of it).
+_NLOPT: dict[str, float] = {
+    NloptSolver.MaxEvalName(): 60,
+    NloptSolver.XRelativeToleranceName(): 1e-6,
+    NloptSolver.ConstraintToleranceName(): 1e-9,
+}
+_SNOPT: dict[str, float] = {"Major iterations limit": 50}
 
 
 class LicProgram(MathematicalProgram):
@@ -58,14 +63,10 @@ class LicProgram(MathematicalProgram):
     MathematicalProgram: add constraints and costs on `b0` and `q` to it, before a
     `LicSelector` solves it. Its variables are the positions of the mobile robot in its plant.
 
-    Args:
-        situation: Goal, feasible starts and failed attempts.
-        objective: F.
-
     Attributes:
         b0: Variables of base and torso, (x, y, torso), shape (3,), metres.
         q: Variables of the joint angles, shape (m,), radians.
-        situation: What was asked.
+        situation: Goal, feasible starts and failed attempts.
         objective: F.
     """
 
@@ -74,15 +75,17 @@ class LicProgram(MathematicalProgram):
         self.situation, self.objective = situation, objective
         starts = situation.starts
         self._arm = arm = starts.arm
-        plant, context = _plant_of(starts)
+        # The mobile robot, before what it must keep away from if there is anything.
+        known = starts.checker
+        plant, context = (known.plant, known.plant_context) if known else _alone(arm)
         self.b0 = self.NewContinuousVariables(3, "b0")
         self.q = self.NewContinuousVariables(len(arm.q_min), "q")
         everything = np.concatenate([self.b0, self.q])
         world, hand = plant.world_frame(), plant.GetFrameByName(arm.tip_frame)
         zeros = np.zeros(3)
 
-        margin = LIMIT_MARGIN_RAD
-        self.AddBoundingBoxConstraint(arm.q_min + margin, arm.q_max - margin, self.q)
+        low, high = arm.q_min + _LIMIT_MARGIN_RAD, arm.q_max - _LIMIT_MARGIN_RAD
+        self.AddBoundingBoxConstraint(low, high, self.q)
         self._base = self.AddBoundingBoxConstraint(zeros, zeros, self.b0).evaluator()
         self._place = PositionConstraint(plant, world, zeros, zeros, hand, zeros, context)
         self.AddConstraint(self._place, everything)
@@ -93,32 +96,23 @@ class LicProgram(MathematicalProgram):
         (middle, angle), ahead = starts.regions[0].cone, np.array([1.0, 0.0, 0.0])
         self._axis: PositionConstraint | None = None
         if angle > 0.0:
-            cone = AngleBetweenVectorsConstraint(
-                plant, world, middle, hand, ahead, 0.0, angle, context
-            )
+            ends = (0.0, angle)
+            cone = AngleBetweenVectorsConstraint(plant, world, middle, hand, ahead, *ends, context)
             self.AddConstraint(cone, everything)
         else:
             self._axis = PositionConstraint(plant, world, zeros, zeros, hand, ahead, context)
             self.AddConstraint(self._axis, everything)
-        # Kinks of an L1 kernel make solvers crawl or report failure at good points; the result is
-        # checked anyway. With distances SNOPT gained most (NLopt's SLSQP two thirds of it).
-        self._options = SolverOptions()
-        self._solver: SolverInterface
+        self._solver: SolverInterface = NloptSolver() if starts.checker is None else SnoptSolver()
+        self._options, options = SolverOptions(), _SNOPT
         if starts.checker is None:
-            self._solver = NloptSolver()
-            self._options.SetOption(self._solver.id(), NloptSolver.MaxEvalName(), 60)
-            self._options.SetOption(self._solver.id(), NloptSolver.XRelativeToleranceName(), 1e-6)
-            self._options.SetOption(self._solver.id(), NloptSolver.ConstraintToleranceName(), 1e-9)
+            options = _NLOPT
         else:
-            self._solver = SnoptSolver()
-            self._options.SetOption(self._solver.id(), "Major iterations limit", 50)
             clearance = MinimumDistanceLowerBoundConstraint(
-                plant=plant,
-                bound=CLEARANCE_M,
-                plant_context=context,
-                influence_distance_offset=INFLUENCE_M,
+                plant, CLEARANCE_M, context, influence_distance_offset=_INFLUENCE_M
             )
             self.AddConstraint(clearance, everything)
+        for name, value in options.items():
+            self._options.SetOption(self._solver.id(), name, value)
         self._chance = 1.0
         self.AddCost(weakly(self._cost), everything)
         bindings: list[Any] = [*self.GetAllConstraints(), *self.GetAllCosts()]
@@ -137,12 +131,7 @@ class LicProgram(MathematicalProgram):
         self._chance = float(self.situation.starts.chance(region.lower[None])[0])
 
     def solve(self, region: Region, start: Start) -> Start:
-        """Returns where the solver ends in a region, feasible or not.
-
-        Args:
-            region: Bounds of x0 and b0.
-            start: Where to begin, with joint angles.
-        """
+        """Returns where the solver ends in a region, feasible or not, from joint angles on."""
         assert start.q is not None
         self.set_region(region)
         result = self._solver.Solve(self, np.append(start.b0, start.q), self._options)
@@ -152,7 +141,7 @@ class LicProgram(MathematicalProgram):
         return Start(self.hand_pose(b0, q), b0, q)
 
     def hand_pose(self, b0: Vector, q: Vector) -> Vector:
-        """Returns x0 = X_WE(b0, q), shape (3,), or (7,) in space; see `Start`."""
+        """Returns x0 = X_WE(b0, q), shape (3,), or (7,) in space."""
         x0 = self._arm.tip_pose(q)
         axes = 2 if len(x0) == IN_PLANE else 3
         x0[:axes] += b0[:axes]
@@ -174,16 +163,13 @@ class LicProgram(MathematicalProgram):
         return values
 
     def satisfied(self, starts: Starts) -> BoolVector:
-        """Returns which of n starts satisfy the constraints that were added, shape (n,).
-
-        Those on joint angles do not count for starts without them.
-        """
+        """Returns which of n starts satisfy the constraints that were added; see `values`."""
         satisfied = np.ones(len(starts), dtype=bool)
         for binding in self._added(self.GetAllConstraints()):
             known, value = self._evaluate(binding, starts)
             low, high = binding.evaluator().lower_bound(), binding.evaluator().upper_bound()
-            inside = (value >= low - TOLERANCE) & (value <= high + TOLERANCE)
-            satisfied[known] &= np.all(inside, axis=1)
+            beyond = np.maximum(low - value, value - high)
+            satisfied[known] &= np.all(beyond <= _TOLERANCE, axis=1)
         return satisfied
 
     def _added(self, bindings: Sequence[Any]) -> list[Any]:
@@ -191,11 +177,7 @@ class LicProgram(MathematicalProgram):
         return [b for b in bindings if not any(b.evaluator() is own for own in self._own)]
 
     def _evaluate(self, binding: Any, starts: Starts) -> tuple[BoolVector, Vector]:
-        """Returns for which of n starts a binding's variables are known, and its values there.
-
-        Raises:
-            RequestError: It has variables that are not this program's own.
-        """
+        """Returns for which of n starts a binding's variables are known, and its values there."""
         index = self.FindDecisionVariableIndices(binding.variables())
         q = np.full((len(starts), len(self.q)), np.nan) if starts.q is None else starts.q
         if max(index) >= 3 + q.shape[1]:
@@ -220,17 +202,10 @@ class LicProgram(MathematicalProgram):
             return -self._chance * value
         pose = self._arm.calc_pose(q)
         by_hand = np.append(by_x0[:2], 0.0) if len(x0) == IN_PLANE else by_x0[:3]
-        turn = by_x0[2] * UP if len(x0) == IN_PLANE else by_x0[3:] @ _quaternion_rates(x0[3:])
+        turn = by_x0[2] * _UP if len(x0) == IN_PLANE else by_x0[3:] @ _quaternion_rates(x0[3:])
         by_q = by_hand @ pose.Jv_E + turn @ pose.Jw_E
         gradient = np.concatenate([by_b0 + by_hand, by_q]) @ ExtractGradient(b0_q)
         return AutoDiffXd(-self._chance * value, -self._chance * gradient)
-
-
-def _plant_of(starts: FeasibleStarts) -> tuple[MultibodyPlant, Context]:
-    """Returns the mobile robot, before what it must keep away from if there is anything."""
-    if starts.checker is not None:
-        return starts.checker.plant, starts.checker.plant_context
-    return _alone(starts.arm)
 
 
 @lru_cache(maxsize=16)

@@ -17,6 +17,9 @@ from lic_drake.select.lic import LicSelector
 from lic_drake.select.objective import SuccessModel
 from lic_drake.select.situation import Selection, Situation
 
+type Columns = Mapping[str, NDArray[Any]]
+"""Columns of a library by name."""
+
 
 class Selector(Protocol):
     """What every strategy offers."""
@@ -24,11 +27,9 @@ class Selector(Protocol):
     @property
     def method(self) -> str:
         """Name of the strategy."""
-        ...
 
     def select(self, situation: Situation) -> Selection:
         """Chooses an initial condition."""
-        ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,111 +46,78 @@ class FallbackSelector:
 
 
 def method_names() -> tuple[str, ...]:
-    """Returns the names of all simple strategies.
+    """Returns the names of all simple strategies; FIRST>LATER is one, too.
 
-    They are the baselines and, for each estimator, LIC (LIC-1, then LIC-2) under its name and
-    LIC-1 for all attempts under its name with a 1: the same where a category has no LIC-2.
-    FIRST>LATER is a strategy, too.
+    The baselines and, for each estimator, LIC (LIC-1, then LIC-2) under its name and LIC-1 for all
+    attempts under its name with a 1: the same where a category has no LIC-2.
     """
     return ("rnd", "cost", *estimator_names(), *(f"{name}1" for name in estimator_names()))
 
 
-def split_method(method: str) -> tuple[str, str | None]:
-    """Returns the strategies of the first attempt and, where another one follows, of the later."""
-    first, arrow, later = method.partition(">")
-    return first, later if arrow else None
-
-
-def check_method(method: str) -> None:
-    """Refuses unknown strategies.
-
-    Raises:
-        RequestError: The strategy is unknown.
-    """
-    for part in split_method(method):
-        if part is not None and part not in method_names():
-            raise RequestError(
-                f"unknown method {method!r}; choose one of {', '.join(method_names())}, or one for"
-                " the first attempt and one for later ones, as in gp>cost"
-            )
+def check_method(method: str) -> list[str]:
+    """Returns the one or two simple strategies of a strategy; a RequestError if it is unknown."""
+    parts = method.split(">", 1)
+    if not set(parts) <= set(method_names()):
+        raise RequestError(
+            f"unknown method {method!r}; choose one of {', '.join(method_names())}, or one for"
+            " the first attempt and one for later ones, as in gp>cost"
+        )
+    return parts
 
 
 def needs_library(method: str) -> bool:
-    """Returns whether a strategy learns from an experience library.
-
-    Raises:
-        RequestError: The strategy is unknown.
-    """
-    check_method(method)
-    return any(part not in ("rnd", "cost", None) for part in split_method(method))
+    """Returns whether a strategy learns from a library; a RequestError if it is unknown."""
+    return not set(check_method(method)) <= {"rnd", "cost"}
 
 
 def make_selector(
     method: str,
     arm: Arm,
-    columns: Mapping[str, NDArray[Any]] | None = None,
+    columns: Columns | None = None,
     rng: np.random.Generator | None = None,
     category: str = "cylinder-clutter",
-    pairs: Mapping[str, NDArray[Any]] | None = None,
+    pairs: Columns | None = None,
 ) -> Selector:
     """Returns a strategy, fitted to a library if it learns from one.
 
     Args:
         method: See `method_names`.
         arm: The robot.
-        columns: Columns of the experience library; not needed by the baselines.
+        columns: Columns of the experience library, if it learns from one.
         rng: Source of draws for RND; by default always the same ones.
         category: Clutter category, which says what LIC observes.
-        pairs: Columns of D2 for LIC-2, see `lic_drake.experience.pairs`; by default it is
-            made from the single reaches of `columns`, as in the paper.
+        pairs: Columns of D2 for LIC-2; by default made from `columns`, as in the paper.
 
     Raises:
         RequestError: The strategy is unknown or has no library to learn from, or there are pairs
             and no LIC-2.
     """
-    check_method(method)
-    first, later = split_method(method)
-    if later is not None:
-        return FallbackSelector(
-            first=make_selector(first, arm, columns, rng, category, pairs),
-            later=make_selector(later, arm, columns, rng, category, pairs),
-            method=method,
-        )
+    parts = check_method(method)
+    if len(parts) > 1:
+        first, later = (make_selector(part, arm, columns, rng, category, pairs) for part in parts)
+        return FallbackSelector(first=first, later=later, method=method)
     if not needs_library(method):
         rng = np.random.default_rng(0) if rng is None else rng
-        if method == "rnd":
-            return RandomSelector(rng=rng)
-        return CostSelector()
+        return RandomSelector(rng=rng) if method == "rnd" else CostSelector()
     if columns is None:
         raise RequestError(f"method {method!r} needs an experience library to learn from")
-    features, only_first = features_of(category), method not in estimator_names()
-    estimator = method[:-1] if only_first else method
-    second = None
+    features, estimator, second = features_of(category), method, None
     if features.second is None and pairs is not None:
         raise RequestError(
             f"{category} has no LIC-2 that could learn from second attempts; leave them out"
         )
-    if features.second is not None and not only_first:
-        pairs = pair_reaches(columns) if pairs is None else pairs
-        second = fit_model(estimator, features.second, pairs)
-    first_model = fit_model(estimator, features.first, columns)
-    return LicSelector(first_model, second, method=method)
+    if method not in estimator_names():
+        estimator = method[:-1]
+    elif features.second is not None:
+        second = fit_model(method, features.second, pairs or pair_reaches(columns))
+    return LicSelector(fit_model(estimator, features.first, columns), second, method=method)
 
 
-def fit_model(
-    estimator: str,
-    features: FeatureMap,
-    columns: Mapping[str, NDArray[Any]],
-) -> SuccessModel:
-    """Returns an estimator fitted to the columns of a library.
+def fit_model(estimator: str, features: FeatureMap, columns: Columns) -> SuccessModel:
+    """Returns an estimator fitted to a library D1, or to pairs D2 where features observe a reach.
 
     Its settings come from the simulated rows; those of other sources change the estimate, by their
     weight, but no setting.
-
-    Args:
-        estimator: Its name, see `estimator_names`.
-        features: What x is made of.
-        columns: Of a library D1, or the pairs D2 where the features observe a first reach.
     """
     rows, fitted = features.rows(columns), make_estimator(estimator, features)
     part = rows.simulated

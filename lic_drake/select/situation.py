@@ -24,11 +24,8 @@ state; one grid step. Where that leaves no start, the next of them counts; -1 ex
 class FailedReach:
     """What a reach that failed showed (paper III-C), all in W.
 
-    Attributes:
-        start: Its start.
-        shown: Values that an observation o may be made of, by the names of the records' columns,
-            see `lic_drake.experience.pairs.SHOWN`; the final ones are only there if it
-            began at all.
+    `shown` has what an observation o may be made of, by the names of the records' columns, see
+    `lic_drake.experience.pairs.SHOWN`; the final values are only there if it began at all.
     """
 
     start: Start
@@ -44,19 +41,12 @@ class FailedReach:
     @classmethod
     def from_record(cls, record: ReachRecord) -> Self:
         """Returns what a record says of a failed reach."""
-        shown = {name: getattr(record, name) for name in SHOWN}
-        return cls(start=record.start, shown=shown)
+        return cls(start=record.start, shown={name: getattr(record, name) for name in SHOWN})
 
 
 @dataclass(frozen=True, kw_only=True)
 class Situation:
-    """The goal, the feasible starts, and the attempts at the goal that failed.
-
-    Attributes:
-        p_WG: Goal, shape (3,), metres.
-        starts: The feasible starts.
-        failed: Failed attempts in this environment, in their order.
-    """
+    """The goal, the feasible starts, and the attempts at the goal that failed, in their order."""
 
     p_WG: Vector
     starts: FeasibleStarts
@@ -69,16 +59,11 @@ class Situation:
     @cached_property
     def retry_distance_m(self) -> float:
         """How far from failed attempts a further one starts, metres."""
-        return next(
-            (d for d in RETRY_DISTANCES_M if np.any(self._away(self.starts.grid, d))),
-            RETRY_DISTANCES_M[-1],
-        )
+        leaves_some = (d for d in RETRY_DISTANCES_M if np.any(self._away(self.starts.grid, d)))
+        return next(leaves_some, RETRY_DISTANCES_M[-1])
 
     def allowed(self, some: Starts) -> BoolVector:
-        """Returns which of n starts are far enough from all failed ones, shape (n,).
-
-        None of them is one that failed.
-        """
+        """Returns which of n starts are far enough from all failed ones, shape (n,)."""
         return self._away(some, self.retry_distance_m)
 
     def untried(self, some: Starts) -> BoolVector:
@@ -90,13 +75,11 @@ class Situation:
 
         In space these are all of them: a failed aperture may be tried from another base.
         """
-        if self.retry_distance_m < 0.0 or not self.failed or not self.starts.arm.is_planar:
-            return self.starts.regions
+        regions, margin = self.starts.regions, self.retry_distance_m + 1e-6
+        if margin < 0.0 or not self.failed or not self.starts.arm.is_planar:
+            return regions
         failed = [reach.start for reach in self.failed]
-        margin = self.retry_distance_m + 1e-6
-        return tuple(
-            part for region in self.starts.regions for part in region.away_from(failed, margin)
-        )
+        return tuple(part for region in regions for part in region.away_from(failed, margin))
 
     def _away(self, some: Starts, distance_m: float) -> BoolVector:
         away = np.ones(len(some), dtype=bool)
@@ -111,15 +94,11 @@ class Situation:
         return away
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Selection:
-    """A chosen start.
+    """A chosen start with joint angles, by which strategy, and how long that took.
 
-    Attributes:
-        start: Hand pose, base and torso, and the joint angles to begin with.
-        probability: Estimated probability of success; None for strategies without an estimate.
-        method: Name of the strategy.
-        seconds: Wall time of the selection.
+    `probability` is the estimated one of success; None for strategies without an estimate.
     """
 
     start: Start

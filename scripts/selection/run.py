@@ -18,12 +18,12 @@ from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 from lic_drake.reach.start import Start, Starts
 from lic_drake.seeds import make_generator
-from lic_drake.select.lbfgsb import LbfgsbSelector
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.program import LicProgram
 from lic_drake.select.registry import fit_model
 from lic_drake.select.situation import Situation
 from lic_drake.starts import FeasibleStarts, Region, make_starts
+from scripts.selection.lbfgsb import LbfgsbSelector
 
 
 class SearchSelector(LicSelector):

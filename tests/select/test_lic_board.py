@@ -9,14 +9,12 @@ from support.select_surfaces import Bumps
 
 from lic_drake.estimate.features import FeatureMap
 from lic_drake.reach.scenario import load_scenario
-from lic_drake.reach.start import Start, Starts
-from lic_drake.select.lbfgsb import LbfgsbSelector
+from lic_drake.reach.start import Starts
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.objective import SuccessModel
 from lic_drake.select.situation import FailedReach, Situation
 from lic_drake.starts import BoardStarts, board_starts
 
-KINDS = pytest.mark.parametrize("kind", [LicSelector, LbfgsbSelector])
 BLOCKED = load_scenario("sphere-aperture-clutter", "{clutter: {num_blocked: 10}}")
 ROLLING = FeatureMap(goal=("goal_y", "goal_z"), start=("start_y", "start_z", "start_qx"))
 """Features of a hand behind a board that may roll."""
@@ -46,13 +44,12 @@ def before_board(environment: int, *failed: FailedReach) -> Situation:
     return Situation(p_WG=BLOCKED.sample_goal("holdout", environment), starts=starts, failed=failed)
 
 
-@KINDS
 @pytest.mark.parametrize("environment", range(3))
 def test_a_pr2_points_into_an_open_aperture_and_no_start_of_the_grid_is_better(
-    kind: type[LicSelector], environment: int
+    environment: int,
 ) -> None:
     asked = before_board(environment)
-    selector = kind(RIDGE)
+    selector = LicSelector(RIDGE)
     chosen = selector.select(asked)
     x0, b0, q = chosen.start.x0, chosen.start.b0, chosen.start.q
     assert isinstance(asked.starts, BoardStarts) and q is not None
@@ -87,32 +84,6 @@ def test_a_pr2s_selection_is_better_than_random_samples_and_gains_over_the_grid(
     assert max(gains) > 0.02
 
 
-def test_a_translated_board_has_a_translated_answer() -> None:
-    """Board, goal and the range of the base move 0.1 m to the left: so does the answer."""
-    text = "{{clutter: {{board_centre: [0.53, {0}, 0.89]}}, task: {{stand: {{y_min_m: {1},"
-    text += " y_max_m: {2}, training_y_m: [{1}]}}}}}}"
-    chosen = []
-    for shift in (0.0, 0.1):
-        scenario = load_scenario(
-            "sphere-aperture-clutter", text.format(-0.29 + shift, -0.2 + shift, shift)
-        )
-        instance = scenario.sample_instance("holdout", 0)
-        starts = board_starts(scenario, instance, moves=True)
-        asked = Situation(p_WG=np.array([0.84, -0.2 + shift, 0.9]), starts=starts)
-        chosen.append(LicSelector(RIDGE).select(asked))
-    here, there = (item.start for item in chosen)
-    np.testing.assert_allclose(there.x0 - here.x0, [0.0, 0.1, *np.zeros(5)], atol=2e-4)
-    np.testing.assert_allclose(there.b0 - here.b0, [0.0, 0.1, 0.0], atol=2e-4)
-    assert chosen[1].probability == pytest.approx(chosen[0].probability, abs=1e-4)
-
-
-def test_a_further_attempt_goes_through_another_aperture() -> None:
-    first = LicSelector(RIDGE).select(before_board(0))
-    failed = FailedReach.from_start(first.start)
-    second = LicSelector(RIDGE).select(before_board(0, failed))
-    assert np.linalg.norm(second.start.x0[:3] - first.start.x0[:3]) > 0.19
-
-
 def test_an_aperture_that_may_be_blocked_counts_less() -> None:
     asked = before_board(1)
     assert isinstance(asked.starts, BoardStarts)
@@ -122,36 +93,3 @@ def test_an_aperture_that_may_be_blocked_counts_less() -> None:
     starts = replace(asked.starts, probability_open=chance)
     other = LicSelector(RIDGE).select(Situation(p_WG=asked.p_WG, starts=starts))
     assert np.linalg.norm(other.start.x0[:3] - sure.start.x0[:3]) > 0.19
-
-
-def test_lic_2_of_ones_own_knows_where_the_first_reach_began() -> None:
-    class Away(Bumps):
-        """Likes to begin far from where the first reach began."""
-
-        def __init__(self) -> None:
-            pass
-
-        def _values(self, X: np.ndarray) -> np.ndarray:
-            return np.asarray(np.linalg.norm(X[:, 4:6] - X[:, 2:4], axis=1))
-
-        def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
-            apart = x[4:6] - x[2:4]
-            gradient = np.zeros(7)
-            gradient[4:6] = apart / np.linalg.norm(apart)
-            gradient[2:4] = -gradient[4:6]
-            return float(np.linalg.norm(apart)), gradient
-
-    features = FeatureMap(
-        goal=ROLLING.goal,
-        start=ROLLING.start,
-        observed=("first_start_y", "first_start_z"),
-    )
-    model = SuccessModel(estimator=Away(), features=features)
-    asked = before_board(1)
-    assert isinstance(asked.starts, BoardStarts)
-    x0 = np.array([*asked.starts.p_WA[0], 1.0, 0.0, 0.0, 0.0])
-    failed = FailedReach.from_start(Start(x0, np.array([0.0, 0.1, 0.2])))
-    chosen = LicSelector(RIDGE, model).select(before_board(1, failed))
-    reachable = np.unique(asked.starts.grid.x0[:, :3], axis=0)
-    farthest = reachable[np.argmax(np.linalg.norm(reachable - x0[:3], axis=1))]
-    np.testing.assert_allclose(chosen.start.x0[:3], farthest)

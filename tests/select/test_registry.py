@@ -9,17 +9,14 @@ from lic_drake.errors import RequestError
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.start import Start
 from lic_drake.robots.pr2 import pr2_arm
-from lic_drake.select.baselines import CostSelector, RandomSelector
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.registry import (
-    FallbackSelector,
-    Selector,
     check_method,
     make_selector,
     method_names,
     needs_library,
 )
-from lic_drake.select.situation import FailedReach, Selection, Situation
+from lic_drake.select.situation import FailedReach, Situation
 
 GOAL = np.array([0.6, 0.1, 0.0])
 
@@ -40,20 +37,16 @@ def test_a_known_strategy_is_accepted_and_named_in_its_selections(
     assert selector.method == method
 
 
-@pytest.mark.parametrize("method", ["svm", "", "gp2", ">", "gp>", ">cost", "gp>cost>rnd", "GP"])
+@pytest.mark.parametrize("method", ["svm", ">cost", "gp>cost>rnd"])
 def test_an_unknown_strategy_is_refused_with_the_known_ones(method: str) -> None:
     with pytest.raises(RequestError, match=r"choose one of rnd, cost, gp, .* as in gp>cost") as e:
         check_method(method)
     assert f"unknown method {method!r}" in str(e.value)
-    for use in (needs_library, lambda name: make_selector(name, ARM, {})):
-        with pytest.raises(RequestError, match="unknown method"):
-            use(method)
 
 
-@pytest.mark.parametrize("method", ["gp", "knn1", "rnd>gp"])
-def test_what_learns_needs_a_library(method: str) -> None:
+def test_what_learns_needs_a_library() -> None:
     with pytest.raises(RequestError, match="needs an experience library to learn from"):
-        make_selector(method, ARM)
+        make_selector("rnd>gp", ARM)
 
 
 def test_only_the_plain_name_has_lic2(columns: dict[str, np.ndarray]) -> None:
@@ -69,29 +62,12 @@ def test_only_the_plain_name_has_lic2(columns: dict[str, np.ndarray]) -> None:
     np.testing.assert_array_equal(both.select(situation).start.x0, first.select(situation).start.x0)
 
 
-def test_one_strategy_for_the_first_attempt_and_another_for_all_later_ones() -> None:
-    asked: list[tuple[str, int]] = []
-
-    class Noting(RandomSelector):
-        def select(self, situation: Situation) -> Selection:
-            asked.append((self.method, len(situation.failed)))
-            return super().select(situation)
-
-    def noting(name: str) -> Selector:
-        return Noting(rng=np.random.default_rng(0), method=name)
-
-    selector = FallbackSelector(first=noting("a"), later=noting("b"), method="a>b")
-    failed = tuple(FailedReach.from_start(Start(x0)) for x0 in LINE.grid.x0[:2])
-    for n in (0, 1, 2):
-        selector.select(Situation(p_WG=GOAL, starts=LINE, failed=failed[:n]))
-    assert asked == [("a", 0), ("b", 1), ("b", 2)]
-
-
-def test_the_parts_of_a_combination_are_the_strategies_of_their_names() -> None:
+def test_one_strategy_makes_the_first_attempt_and_another_all_later_ones() -> None:
     selector = make_selector("rnd>cost", ARM)
-    assert isinstance(selector, FallbackSelector)
-    assert isinstance(selector.first, RandomSelector)
-    assert isinstance(selector.later, CostSelector)
+    failed = tuple(FailedReach.from_start(Start(x0)) for x0 in LINE.grid.x0[:2])
+    for n, method in enumerate(("rnd", "cost", "cost")):
+        chosen = selector.select(Situation(p_WG=GOAL, starts=LINE, failed=failed[:n]))
+        assert chosen.method == method
 
 
 def test_behind_a_board_there_is_no_lic_2_and_pairs_for_it_are_refused() -> None:

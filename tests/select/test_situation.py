@@ -1,7 +1,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support.fake_reach import make_record
@@ -14,10 +13,6 @@ from lic_drake.select.situation import FailedReach, Situation
 from lic_drake.starts import LineStarts
 
 GOAL = np.array([0.6, 0.1, 0.0])
-
-
-def failed_from(y_m: float) -> FailedReach:
-    return FailedReach.from_start(Start(np.array([0.335, y_m, 0.5])))
 
 
 @given(
@@ -62,7 +57,7 @@ def test_the_neighbourhood_of_failures_is_as_large_as_leaves_a_start_of_the_grid
     starts: LineStarts, failed_y: list[float], failed_rows: list[int]
 ) -> None:
     grid = starts.grid
-    failed = [failed_from(value) for value in failed_y]
+    failed = [FailedReach.from_start(Start(np.array([0.335, y, 0.5]))) for y in failed_y]
     failed += [FailedReach.from_start(grid[i]) for i in failed_rows]
     situation = Situation(p_WG=GOAL, starts=starts, failed=tuple(failed))
     allowed = situation.allowed(grid)
@@ -82,21 +77,6 @@ def test_the_neighbourhood_of_failures_is_as_large_as_leaves_a_start_of_the_grid
         if expected.any() or distance < 0.0:
             np.testing.assert_array_equal(allowed, expected)
             break
-
-
-@pytest.mark.parametrize("y_m", [0.0, -0.3])  # Those of this library never begin at y = -0.3 m.
-def test_a_failed_reach_shows_what_its_record_says_in_the_world(y_m: float) -> None:
-    request = reach_request(load_scenario("cylinder-clutter"), y_m=y_m)
-    request = replace(request, start=Start(request.start.x0, np.array([0.1, -0.2, 0.0])))
-    record = make_record(request)
-    failed = FailedReach.from_record(record)
-    np.testing.assert_array_equal(failed.start.x0, request.start.x0)
-    np.testing.assert_array_equal(failed.start.b0[:2], [0.1, -0.2])
-    assert [failed.shown[n] for n in ("start_x", "start_y", "start_phi")] == list(request.start.x0)
-    final = ("final_x", "final_y", "final_phi", "final_vx", "final_vy")
-    np.testing.assert_array_equal(
-        [failed.shown[name] for name in final], [getattr(record, name) for name in final]
-    )
 
 
 # In space
@@ -124,26 +104,6 @@ def test_in_space_a_failed_aperture_is_tried_again_from_elsewhere_only() -> None
     # Deeper makes no difference.
     deeper = Starts(starts.grid.x0 + np.eye(7)[0], starts.grid.b0)
     np.testing.assert_array_equal(situation.allowed(deeper), ~near)
-
-
-def test_all_that_did_not_fail_may_be_tried_where_no_place_is_left_at_a_distance() -> None:
-    starts = InSpace()
-    starts.grid.b0[6:, 2] = 0.1
-    starts.grid.x0[6:, 0] += 0.01
-    failed = tuple(FailedReach.from_start(starts.grid[i]) for i in range(6))
-    situation = Situation(p_WG=GOAL, starts=starts, failed=failed)
-    assert situation.retry_distance_m == -1.0
-    np.testing.assert_array_equal(situation.allowed(starts.grid), np.arange(12) >= 6)
-    np.testing.assert_array_equal(situation.untried(starts.grid), np.arange(12) >= 6)
-
-
-def test_a_failure_in_space_is_known_by_position_quaternion_and_torso() -> None:
-    x0 = np.array([0.53, -0.3, 0.9, 0.8, 0.6, 0.0, 0.0])
-    failed = FailedReach.from_start(Start(x0, np.array([0.0, 0.1, 0.2])))
-    assert failed.start.b0[2] == 0.2
-    names = [f"start_{axis}" for axis in ("x", "y", "z", "qw", "qx", "qy", "qz")]
-    assert list(failed.shown) == names
-    np.testing.assert_array_equal([failed.shown[name] for name in names], x0)
 
 
 def test_a_failed_reach_in_space_shows_heights_and_torso_of_its_record() -> None:
