@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from lic_drake.estimate.estimator import SuccessEstimator as SuccessEstimator
     from lic_drake.estimate.estimator import from_sklearn as from_sklearn
     from lic_drake.estimate.registry import register_estimator as register_estimator
-    from lic_drake.evaluate.experiment import Evaluation as Evaluation
-    from lic_drake.evaluate.experiment import run_evaluation as run_evaluation
+    from lic_drake.evaluate.trial import Evaluation as Evaluation
+    from lic_drake.evaluate.trial import run_evaluation as run_evaluation
     from lic_drake.evaluate.trial import run_trial as run_trial
     from lic_drake.experience.collect import CollectionRequest as CollectionRequest
     from lic_drake.experience.collect import collect as collect
@@ -46,7 +46,7 @@ __version__ = "0.1.0"
 _HOMES = {
     "Arm": "robots.arm",
     "CollectionRequest": "experience.collect",
-    "Evaluation": "evaluate.experiment",
+    "Evaluation": "evaluate.trial",
     "ExperienceLibrary": "experience.store",
     "FailedReach": "select.situation",
     "LicError": "errors",
@@ -68,7 +68,7 @@ _HOMES = {
     "register_category": "clutter.registry",
     "register_estimator": "estimate.registry",
     "register_robot": "robots.registry",
-    "run_evaluation": "evaluate.experiment",
+    "run_evaluation": "evaluate.trial",
     "run_reach": "reach.session",
     "run_trial": "evaluate.trial",
     "shipped_library": "paths",

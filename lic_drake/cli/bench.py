@@ -2,7 +2,6 @@
 
 import argparse
 import json
-from dataclasses import asdict
 
 from lic_drake.cli.arguments import (
     Subparsers,
@@ -41,13 +40,13 @@ def run(args: argparse.Namespace) -> int:
 
     speed = measure_reaches(load_scenario(args.scenario, args.set), args.reaches)
     if args.json:
-        print(json.dumps(asdict(speed)))
+        print(json.dumps(speed))
         return 0
     print(
-        f"{speed.robot} in {speed.category}: {speed.wall_per_sim_s:.4f} wall seconds per simulated"
-        f" second, {speed.wall_per_reach_s:.3f} s per reach (medians of {speed.reaches} reaches,"
-        f" {speed.simulated_s:.0f} s simulated)"
+        "{robot} in {category}: {wall_per_sim_s:.4f} wall seconds per simulated second,"
+        " {wall_per_reach_s:.3f} s per reach (medians of {reaches} reaches, {simulated_s:.0f} s"
+        " simulated)".format(**speed)
     )
-    for name, share in speed.split.items():
+    for name, share in speed["split"].items():
         print(f"  {name:8s} {100 * share:5.1f} %")
     return 0

@@ -116,8 +116,8 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Runs the subcommand and returns the exit code."""
-    from lic_drake.evaluate.experiment import Evaluation, run_evaluation
-    from lic_drake.evaluate.table import format_rates, rates_to_dicts, summarize_trials
+    from lic_drake.evaluate.table import format_rates, summarize_trials
+    from lic_drake.evaluate.trial import Evaluation, run_evaluation
     from lic_drake.evaluate.trials import TrialTable
     from lic_drake.paths import shipped_library
 
@@ -153,7 +153,7 @@ def run(args: argparse.Namespace) -> int:
         return exit_codes.INTERRUPTED
     rates = summarize_trials(TrialTable(rows), args.attempts, args.variant)
     if args.json:
-        print(json.dumps({"trials": str(evaluation.trials_path), "rates": rates_to_dicts(rates)}))
+        print(json.dumps({"trials": str(evaluation.trials_path), "rates": rates}))
     else:
         print(format_rates(rates), end="")
     return 0

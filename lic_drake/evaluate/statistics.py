@@ -4,11 +4,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.stats import binomtest, norm
-from scipy.stats import t as student_t
+from scipy.stats import binomtest, norm, ttest_ind_from_stats
 
 from lic_drake.intervals import wilson_interval
+from lic_drake.types import BoolVector
 
 
 class Count(NamedTuple):
@@ -22,17 +21,17 @@ class Count(NamedTuple):
         """Success rate; NaN without trials."""
         return self.successes / self.trials if self.trials else math.nan
 
-    def interval(self, confidence: float = 0.9) -> tuple[float, float]:
-        """Returns the Wilson interval of the rate."""
-        return wilson_interval(self.successes, self.trials, confidence)
+    def interval(self) -> tuple[float, float]:
+        """Returns the Wilson interval of the rate, 90 %."""
+        return wilson_interval(self.successes, self.trials, 0.9)
 
 
-def count(success: NDArray[np.bool_]) -> Count:
+def count(success: BoolVector) -> Count:
     """Counts the successes in an array of any shape."""
     return Count(int(success.sum()), success.size)
 
 
-def mcnemar(a: NDArray[np.bool_], b: NDArray[np.bool_]) -> float:
+def mcnemar(a: BoolVector, b: BoolVector) -> float:
     """Returns the p-value of McNemar's exact (binomial) test for paired successes, shape (n,)."""
     only_a, only_b = int(np.sum(a & ~b)), int(np.sum(b & ~a))
     if only_a + only_b == 0:
@@ -40,29 +39,18 @@ def mcnemar(a: NDArray[np.bool_], b: NDArray[np.bool_]) -> float:
     return float(binomtest(only_a, only_a + only_b).pvalue)
 
 
-class Difference(NamedTuple):
-    """A difference of two success rates on the same trials, with its confidence interval."""
+def paired_difference(a: BoolVector, b: BoolVector) -> tuple[float, float, float]:
+    """Returns the success rate of a minus that of b on the same trials, and its 90 % interval.
 
-    value: float
-    low: float
-    high: float
-
-
-def paired_difference(
-    a: NDArray[np.bool_], b: NDArray[np.bool_], confidence: float = 0.9
-) -> Difference:
-    """Returns the success rate of a minus that of b on the same trials, shape (n,), n > 0.
-
-    The interval is Wald's for paired proportions with half a trial added to each of the four
-    outcomes, which keeps its coverage when few trials differ (Agresti and Min 2005, "Simple
-    improved confidence intervals for comparing matched proportions").
+    The interval is Wald's with half a trial added to each of the four outcomes (Agresti and Min
+    2005, "Simple improved confidence intervals for comparing matched proportions").
     """
     only_a, only_b = int(np.sum(a & ~b)), int(np.sum(b & ~a))
     n = len(a) + 2.0
     centre = (only_a - only_b) / n
-    variance = ((only_a + only_b + 1.0) / n - centre**2) / n
-    half_width = float(norm.ppf(0.5 + 0.5 * confidence)) * math.sqrt(variance)
-    return Difference(
+    deviation = math.sqrt(((only_a + only_b + 1.0) / n - centre**2) / n)
+    half_width = float(norm.ppf(0.95)) * deviation
+    return (
         (only_a - only_b) / len(a),
         max(-1.0, centre - half_width),
         min(1.0, centre + half_width),
@@ -82,19 +70,9 @@ def two_sample_t_test(a: Count, b: Count) -> TTest:
 
     The paper calls its tests paired, but its degrees of freedom and all five values of t are those
     of this unpaired test on the totals of two attempts. `mcnemar` is paired.
-
-    Raises:
-        ValueError: Fewer than two trials of a strategy.
     """
     if min(a.trials, b.trials) < 2:
         raise ValueError(f"a t-test needs 2 trials of each strategy, got {a.trials}, {b.trials}")
-    df = a.trials + b.trials - 2
-    # Sum of squared deviations from the mean.
-    squares = sum(item.trials * item.rate * (1.0 - item.rate) for item in (a, b))
-    error = math.sqrt(squares / df * (1.0 / a.trials + 1.0 / b.trials))
-    difference = a.rate - b.rate
-    if error == 0.0:
-        t = math.copysign(math.inf, difference) if difference else 0.0
-    else:
-        t = difference / error
-    return TTest(df, t, float(2.0 * student_t.sf(abs(t), df)))
+    deviations = [math.sqrt(c.rate * (1.0 - c.rate) * c.trials / (c.trials - 1)) for c in (a, b)]
+    t, p = ttest_ind_from_stats(a.rate, deviations[0], a.trials, b.rate, deviations[1], b.trials)
+    return TTest(a.trials + b.trials - 2, float(t), float(p))

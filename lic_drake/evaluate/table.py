@@ -1,7 +1,7 @@
 """Tables of text as Markdown or LaTeX, and the summary of an evaluation."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,24 +13,12 @@ _ESCAPES = str.maketrans({"&": r"\&", "%": r"\%", "_": r"\_", "#": r"\#", "$": r
 
 @dataclass(frozen=True, kw_only=True)
 class Table:
-    """Cells of text under headings, with remarks below.
-
-    Attributes:
-        caption: One or more sentences.
-        heading: Column headings.
-        rows: Cells, one for each heading; None is a horizontal line.
-        remarks: Sentences below the table.
-    """
+    """Cells of text under headings, with remarks below; a row of None is a horizontal line."""
 
     caption: str
     heading: tuple[str, ...]
     rows: tuple[tuple[str, ...] | None, ...]
     remarks: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        for row in self.rows:
-            if row is not None and len(row) != len(self.heading):
-                raise ValueError(f"{len(self.heading)} headings, but a row of {len(row)}: {row}")
 
     def to_markdown(self) -> str:
         """Returns caption, table and remarks as Markdown, without horizontal lines."""
@@ -42,17 +30,16 @@ class Table:
 
     def to_latex(self) -> str:
         """Returns the table as a LaTeX table environment that requires no packages."""
-        body = [r"\hline" if row is None else _latex_row(row) for row in self.rows]
+        body = [
+            r"\hline" if row is None else " & ".join(map(latex_text, row)) + r" \\"
+            for row in (None, self.heading, None, *self.rows, None)
+        ]
         lines = [
             r"\begin{table}",
             r"\centering",
             rf"\caption{{{latex_text(self.caption)}}}",
             rf"\begin{{tabular}}{{{'l' * len(self.heading)}}}",
-            r"\hline",
-            _latex_row(self.heading),
-            r"\hline",
             *body,
-            r"\hline",
             r"\end{tabular}",
             r"\end{table}",
         ]
@@ -84,62 +71,38 @@ def latex_text(text: str) -> str:
     return re.sub(r"(?<=\d)\.\.(?=[+$\d])", "--", text)
 
 
-def _latex_row(row: tuple[str, ...]) -> str:
-    return " & ".join(map(latex_text, row)) + r" \\"
+def summarize_trials(table: TrialTable, attempts: int, variant: str = "") -> list[dict[str, Any]]:
+    """Returns the success rate of each strategy within 1 to `attempts` attempts, for JSON.
 
-
-@dataclass(frozen=True, kw_only=True)
-class Rate:
-    """A strategy's success within a number of attempts.
-
-    `p_value` is McNemar's exact paired test against RND on the same goals; NaN for RND.
+    `p_value` is McNemar's exact paired test against RND on the same goals; None for RND.
     """
-
-    method: str
-    attempts: int
-    count: Count
-    p_value: float
-
-
-def summarize_trials(table: TrialTable, attempts: int, variant: str = "") -> list[Rate]:
-    """Returns the success rate of each strategy within 1 to `attempts` attempts."""
-    methods = table.methods(variant)
     rates = []
     for number in range(1, attempts + 1):
-        won = {method: table.success(method, number, variant) for method in methods}
-        for method in methods:
+        won = {method: table.success(method, number, variant) for method in table.methods(variant)}
+        for method, success in won.items():
+            result = count(success)
             compared = "rnd" in won and method != "rnd"
-            p = mcnemar(won[method], won["rnd"]) if compared else float("nan")
-            rates.append(Rate(method=method, attempts=number, count=count(won[method]), p_value=p))
+            rates.append(
+                {
+                    "method": method,
+                    "attempts": number,
+                    **result._asdict(),
+                    "interval": list(result.interval()),
+                    "p_value": mcnemar(success, won["rnd"]) if compared else None,
+                }
+            )
     return rates
 
 
-def rates_to_dicts(rates: Sequence[Rate]) -> list[dict[str, Any]]:
-    """Returns the rates as plain data for JSON; NaN p-values become None."""
-    return [
-        {
-            "method": rate.method,
-            "attempts": rate.attempts,
-            "successes": rate.count.successes,
-            "trials": rate.count.trials,
-            "interval": list(rate.count.interval()),
-            "p_value": None if rate.p_value != rate.p_value else rate.p_value,
-        }
-        for rate in rates
-    ]
-
-
-def format_rates(rates: Sequence[Rate]) -> str:
-    """Returns the rates as a Markdown table."""
+def format_rates(rates: Sequence[Mapping[str, Any]]) -> str:
+    """Returns the rates of `summarize_trials` as a Markdown table."""
     lines = [
         "| strategy | attempts | success, % | 90 % interval | trials | p against RND |",
         "|---|---|---|---|---|---|",
     ]
     for rate in rates:
-        success, interval, _ = rate_cells(rate.count)
-        p = "" if rate.p_value != rate.p_value else f"{rate.p_value:.2g}"
-        lines.append(
-            f"| {rate.method} | {rate.attempts} | {success} | {interval} | {rate.count.trials}"
-            f" | {p} |"
-        )
+        success, interval, _ = rate_cells(Count(rate["successes"], rate["trials"]))
+        p = "" if rate["p_value"] is None else f"{rate['p_value']:.2g}"
+        cells = (rate["method"], rate["attempts"], success, interval, rate["trials"], p)
+        lines.append(f"| {' | '.join(map(str, cells))} |")
     return "\n".join(lines) + "\n"

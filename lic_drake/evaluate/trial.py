@@ -1,18 +1,43 @@
-"""A trial: attempts at one goal in one environment until one succeeds (paper VI-A)."""
+"""Trials (paper VI-A), and evaluations of several strategies by trials at the same goals."""
 
+import gc
+import math
+import time
+from collections import defaultdict
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from pathlib import Path
+from typing import Any
+from uuid import uuid4
 
 import numpy as np
 
+from lic_drake.evaluate.trials import TrialRow, read_trials, write_trials
+from lic_drake.experience.pairs import pair_second_attempts
+from lic_drake.experience.runner import Task, refuse_failed, run_tasks, shard_name
+from lic_drake.experience.schema import scenario_text
+from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.experience.workers import Workers
+from lic_drake.perception.config import CamerasConfig, load_cameras
+from lic_drake.perception.observer import Observer
 from lic_drake.reach.request import ReachRecord, ReachRequest
-from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.scenario import Scenario, load_scenario, parse_scenario
 from lic_drake.reach.session import run_reach
 from lic_drake.seeds import make_generator
-from lic_drake.select.registry import Selector
+from lic_drake.select.baselines import RandomSelector
+from lic_drake.select.registry import (
+    FallbackSelector,
+    Selector,
+    check_method,
+    make_selector,
+)
 from lic_drake.select.situation import FailedReach, Selection, Situation
 from lic_drake.starts import FeasibleStarts, make_starts
 from lic_drake.types import Vector
+
+SAY_S = 5.0
+"""Time between two progress messages, seconds."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,20 +64,11 @@ def run_trial(
 ) -> list[Attempt]:
     """Selects and reaches until the goal is reached or the attempts are used up.
 
-    Args:
-        scenario: Category, robot and rules.
-        selector: The strategy.
-        stream: Seed stream of the environment.
-        environment: Its index.
-        p_WG: Goal, shape (3,), metres.
-        attempts: Maximum number of reaches.
-        fresh: Whether the environment is reset before every attempt; otherwise it stays as the
-            previous attempt left it, as on a real robot.
-        moves: Whether a PR2 may move base and torso before a reach.
-        reach: Simulates a request.
-        look: Returns the perceived goal and the starts believed feasible before the attempt with
-            this number, from 0; both are known by default. If the perceived goal has changed, the
-            environment is reset.
+    The goal p_WG has the shape (3,), metres. Unless `fresh`, an attempt finds the environment as
+    the previous one left it, as on a real robot. `moves` says whether a PR2 may move base and torso
+    before a reach, and `reach` simulates a request. `look` returns the perceived goal and the
+    starts believed feasible before the attempt with a number, from 0; both are known by default. If
+    the perceived goal has changed, the environment is reset.
     """
     if look is None:
         known = make_starts(scenario, scenario.sample_instance(stream, environment), moves)
@@ -80,11 +96,7 @@ def random_requests(
 ) -> list[ReachRequest]:
     """Returns reaches from random starts of the grid to random goals: RND's first attempts.
 
-    Args:
-        scenario: The scenario.
-        stream: Seed stream of environments, goals and starts.
-        environments: Number of environments, from index 0.
-        goals: Number of reaches in each, to as many goals unless the environment has one goal.
+    There are `goals` reaches in each environment, to as many goals unless it has a single one.
     """
     requests = []
     for environment in range(environments):
@@ -97,3 +109,221 @@ def random_requests(
             start = starts[int(rng.integers(len(starts)))]
             requests.append(ReachRequest(scenario, stream, environment, p_WG, start))
     return requests
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evaluation:
+    """The parameters of an evaluation; plain data that can be pickled.
+
+    Environments and goals are drawn from a seed stream; `common_goals` are those of environment 0.
+    With `fresh`, the environment is reset before later attempts; `moves` says whether a PR2 may
+    move base and torso. With cameras, a reach succeeds if it ends in the ball.
+
+    Attributes:
+        experience: Library that the strategies learn from; its scenario is the default.
+        results: Folder for `trials.parquet` and the library `reaches`.
+        methods: Strategies, see `lic_drake.select.registry.check_method`.
+        variant: Name of these trials among others in the same folder.
+        second_attempts: Library of real second attempts for LIC-2; None: D2 is composed of single
+            reaches, as in the paper.
+        overrides: YAML text merged into the scenario, for instance to block apertures.
+        scenario_name: Name or path of a scenario other than the library's.
+        cameras: Name or path of those that perceive apertures and goal; empty: both are known.
+    """
+
+    experience: Path
+    results: Path
+    methods: tuple[str, ...]
+    environments: int
+    goals: int
+    attempts: int = 2
+    stream: str = "evaluation"
+    fresh: bool = False
+    variant: str = ""
+    common_goals: bool = False
+    second_attempts: Path | None = None
+    overrides: str = ""
+    moves: bool = True
+    scenario_name: str = ""
+    cameras: str = ""
+
+    @property
+    def trials_path(self) -> Path:
+        """File with one row per attempt."""
+        return self.results / "trials.parquet"
+
+    @property
+    def reaches(self) -> ExperienceLibrary:
+        """The reaches of all attempts."""
+        return ExperienceLibrary(self.results / "reaches")
+
+    def scenario(self) -> Scenario:
+        """Returns the evaluated scenario."""
+        if self.scenario_name:
+            return load_scenario(self.scenario_name, self.overrides)
+        scenario = ExperienceLibrary(self.experience).scenario()
+        if not self.overrides:
+            return scenario
+        return parse_scenario(scenario_text(scenario), self.overrides, source="--set")
+
+
+def run_evaluation(
+    evaluation: Evaluation, workers: Workers | None = None, say: Callable[[str], None] = print
+) -> list[TrialRow]:
+    """Runs every strategy on the same goals in the same environments.
+
+    Stored reaches are reused; selections are always recomputed. The file of trials also keeps those
+    of other variants and strategies. `say` receives progress messages.
+
+    Raises:
+        LicError: A method is unknown, a library cannot be read or written, or an environment
+            failed; reaches of finished environments are kept.
+    """
+    for method in evaluation.methods:
+        check_method(method)
+    scenario = evaluation.scenario()
+    library = evaluation.reaches
+    library.create()
+    library.check_scenario(scenario, "the evaluation")
+    elsewhere = replace(  # Workers may run in other folders.
+        evaluation,
+        experience=evaluation.experience.absolute(),
+        second_attempts=evaluation.second_attempts and evaluation.second_attempts.absolute(),
+    )
+    cameras = load_cameras(evaluation.cameras) if evaluation.cameras else None
+    shared = (uuid4().hex, elsewhere, scenario, cameras)
+    began_s = said_s = time.perf_counter()
+    count, done = evaluation.environments, 0
+    rows: list[TrialRow] = []
+
+    def finish(task: Task, result: tuple[list[TrialRow], list[ReachRecord]]) -> None:
+        nonlocal said_s, done
+        new_rows, records = result
+        if records:
+            library.add_to_shard(task.name, records, scenario)
+        rows.extend(new_rows)
+        done += 1
+        now_s = time.perf_counter()
+        if now_s >= said_s + SAY_S or done == count:
+            said_s, left_s = now_s, (now_s - began_s) * (count - done) / done
+            say(
+                f"  {done}/{count} environments, {len(rows)} attempts, {left_s:.0f} s left; kept in"
+                f" {library.path}"
+            )
+
+    with library.locked():
+        known: defaultdict[int, list[ReachRecord]] = defaultdict(list)
+        for record in library.records() if library.shard_paths() else []:
+            known[record.environment].append(record)
+        tasks = (
+            Task(shard_name(evaluation.stream, i), (*shared, i, known.pop(i, [])))
+            for i in range(count)
+        )
+        refuse_failed(run_tasks(tasks, _try_environment, workers or Workers(), finish))
+        library.compact()
+    rows.sort(key=lambda row: (row.method, row.environment, row.goal, row.attempt))
+    others = read_trials(evaluation.trials_path) if evaluation.trials_path.exists() else []
+    replaced = {(evaluation.variant, method) for method in evaluation.methods}
+    kept = [row for row in others if (row.variant, row.method) not in replaced]
+    write_trials(evaluation.trials_path, [*kept, *rows])
+    return rows
+
+
+class _Strategies:
+    """The strategies of an evaluation, each fitted on first use."""
+
+    def __init__(self, evaluation: Evaluation, scenario: Scenario) -> None:
+        pairs = None
+        if evaluation.second_attempts is not None:
+            attempts = ExperienceLibrary(evaluation.second_attempts)
+            pairs = pair_second_attempts(attempts.columns())
+        self._stream = evaluation.stream
+        arm, category = scenario.arm(), scenario.category
+        columns = ExperienceLibrary(evaluation.experience).columns()
+        self._fitted: Callable[[str], Selector] = cache(
+            partial(make_selector, arm=arm, columns=columns, category=category, pairs=pairs)
+        )
+
+    def selector(self, method: str, environment: int, goal: int) -> Selector:
+        """Returns the strategy for a trial."""
+        parts = check_method(method)
+        if len(parts) > 1:
+            first, later = (self.selector(part, environment, goal) for part in parts)
+            return FallbackSelector(first=first, later=later, method=method)
+        if method == "rnd":
+            # A generator for each trial, independent of all others.
+            rng = make_generator(self._stream, "rnd", environment, goal)
+            return RandomSelector(rng=rng)
+        return self._fitted(method)
+
+
+# Those of the last evaluation, by its unique name: workers reuse them between environments.
+_strategies: dict[str, _Strategies] = {}
+
+
+def _try_environment(
+    name: str,
+    evaluation: Evaluation,
+    scenario: Scenario,
+    cameras: CamerasConfig | None,
+    environment: int,
+    known: list[ReachRecord],
+) -> tuple[list[TrialRow], list[ReachRecord]]:
+    """Runs in a worker: returns all trials in an environment, and its new reaches."""
+    if name not in _strategies:
+        _strategies.clear()
+        _strategies[name] = _Strategies(evaluation, scenario)
+    records = {record.key: record for record in known}
+    new: list[ReachRecord] = []
+
+    def reach(request: ReachRequest) -> ReachRecord:
+        if request.key not in records:
+            records[request.key] = run_reach(request)
+            new.append(records[request.key])
+        return records[request.key]
+
+    rows: list[TrialRow] = []
+    for goal in range(evaluation.goals):
+        at = 0 if evaluation.common_goals else environment
+        p_WG = scenario.sample_goal(evaluation.stream, at, goal)
+        place: dict[str, Any] = {
+            "scenario": scenario,
+            "stream": evaluation.stream,
+            "environment": environment,
+            "p_WG": p_WG,
+            "moves": evaluation.moves,
+        }
+        # All strategies see the same images.
+        observer = None if cameras is None else Observer(cameras=cameras, **place)
+        for method in evaluation.methods:
+            attempts = run_trial(
+                selector=_strategies[name].selector(method, environment, goal),
+                attempts=evaluation.attempts,
+                fresh=evaluation.fresh,
+                reach=reach,
+                look=observer,
+                **place,
+            )
+            last = attempts[-1].record
+            won = last.success if observer is None else observer.touches_ball(last)
+            for number, attempt in enumerate(attempts, start=1):
+                selection = attempt.selection
+                row = TrialRow(
+                    variant=evaluation.variant,
+                    method=method,
+                    environment=environment,
+                    goal=goal,
+                    attempt=number,
+                    key=attempt.request.key,
+                    success=won and number == len(attempts),  # All others failed.
+                    probability=math.nan
+                    if selection.probability is None
+                    else selection.probability,
+                    seconds=selection.seconds,
+                )
+                rows.append(row)
+        if observer is not None:
+            # A renderer takes 150 MB in a reference cycle, which only the collector frees.
+            del observer
+            gc.collect()
+    return rows, new

@@ -9,7 +9,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 import lic_drake
-from lic_drake.errors import LibraryError, quoted, readable_errors
+from lic_drake.errors import LibraryError, readable_errors
 from lic_drake.evaluate.statistics import Count
 from lic_drake.experience.schema import opened, schema_of, write_atomically, write_table
 
@@ -24,16 +24,9 @@ Pair = tuple[int, int]
 class TrialRow:
     """One attempt of a strategy at a goal.
 
-    Attributes:
-        variant: "" for the standard evaluation; other names denote ablations, such as "fresh".
-        method: Strategy, see `lic_drake.select.registry.method_names`.
-        environment: Index of the environment in the evaluation's seed stream.
-        goal: Index of the goal in the environment.
-        attempt: Number of the attempt, from 1.
-        key: Key of the reach in the library of reaches.
-        success: Whether it reached the goal.
-        probability: Estimated success probability of the selected start; NaN without an estimate.
-        seconds: Wall time of the selection.
+    `variant` is "" for the standard evaluation, others denote ablations such as "fresh". Attempts
+    count from 1. `key` is that of the reach in the library of reaches; `probability` is estimated
+    for the selected start, NaN without an estimate; `seconds` is the wall time of the selection.
     """
 
     variant: str
@@ -49,38 +42,26 @@ class TrialRow:
 
 SCHEMA = schema_of(TrialRow)
 """The columns of a file of trials."""
-
 _METADATA = {"lic_drake.trials_version": str(VERSION), "lic_drake.version": lic_drake.__version__}
 
 
 def write_trials(path: Path, rows: Sequence[TrialRow]) -> None:
-    """Writes the rows as a Parquet file, atomically, creating its folder if needed.
-
-    Raises:
-        LibraryError: The file cannot be written.
-    """
-    columns = {name: [getattr(row, name) for row in rows] for name in SCHEMA.names}
-    table = pa.Table.from_pydict(columns, schema=SCHEMA.with_metadata(_METADATA))
+    """Writes the rows as a Parquet file, atomically, creating its folder if needed."""
+    table = pa.Table.from_pylist([vars(row) for row in rows], SCHEMA.with_metadata(_METADATA))
     with readable_errors(path.parent, "create the folder"):
         path.parent.mkdir(parents=True, exist_ok=True)
     write_atomically(path, lambda temporary: write_table(table, temporary))
 
 
 def read_trials(path: Path) -> list[TrialRow]:
-    """Reads a file of trials.
-
-    Raises:
-        LibraryError: The file is missing, damaged, of another kind or of another version.
-    """
+    """Reads a file of trials of this version."""
     with opened(path, "delete it and evaluate again") as file:
         schema = file.schema_arrow
         version = (schema.metadata or {}).get(b"lic_drake.trials_version")
-        if version is None:
-            raise LibraryError(f"{path} holds no trials of lic_drake; choose another file")
         if version != str(VERSION).encode() or not schema.equals(SCHEMA, check_metadata=False):
             raise LibraryError(
-                f"{path} holds trials of version {quoted(version.decode(errors='replace'))} that"
-                f" this lic_drake {lic_drake.__version__} cannot read; evaluate again"
+                f"{path} holds no trials of version {VERSION}, the only one that lic_drake"
+                f" {lic_drake.__version__} can read; choose another file or evaluate again"
             )
         table = file.read()
     return [TrialRow(**row) for row in table.to_pylist()]
@@ -90,11 +71,7 @@ class TrialTable:
     """Trials by variant and method: sequences of attempts that end with the first success."""
 
     def __init__(self, rows: Iterable[TrialRow]) -> None:
-        """Groups attempts into trials.
-
-        Raises:
-            LibraryError: A trial's attempts are not 1, 2, ... or continue after a success.
-        """
+        """Groups attempts into trials; those of each must be 1, 2, ... up to a success."""
         ordered = sorted(rows, key=lambda row: (row.environment, row.goal, row.attempt))
         self._trials: dict[tuple[str, str], dict[Pair, tuple[TrialRow, ...]]] = {}
         for row in ordered:
@@ -118,11 +95,7 @@ class TrialTable:
         return tuple(sorted(method for v, method in self._trials if v == variant))
 
     def pairs(self, variant: str = "") -> list[Pair]:
-        """Returns the environments and goals of a variant, sorted.
-
-        Raises:
-            LibraryError: Its methods were tried on different ones.
-        """
+        """Returns the environments and goals of a variant, which all its methods share, sorted."""
         tried = {method: set(self._trials[variant, method]) for method in self.methods(variant)}
         for method, pairs in tried.items():
             other, others = next(iter(tried.items()))
@@ -135,23 +108,14 @@ class TrialTable:
         return sorted(set().union(*tried.values()))
 
     def trials(self, method: str, variant: str = "") -> dict[Pair, tuple[TrialRow, ...]]:
-        """Returns a method's trials by environment and goal, sorted.
-
-        Raises:
-            LibraryError: There are none.
-        """
+        """Returns a method's trials by environment and goal, sorted."""
         if (variant, method) not in self._trials:
             known = ", ".join(_name(m, v) for v, m in sorted(self._trials)) or "none"
             raise LibraryError(f"no trials of {_name(method, variant)}; there are {known}")
         return self._trials[variant, method]
 
     def success(self, method: str, attempts: int, variant: str = "") -> NDArray[np.bool_]:
-        """Returns whether each of `pairs(variant)` succeeds within some attempts, shape (n,).
-
-        Raises:
-            LibraryError: There are no such trials, some ended before that many attempts, or methods
-                were tried on different goals.
-        """
+        """Returns whether each of `pairs(variant)` succeeds within some attempts, shape (n,)."""
         trials = self.trials(method, variant)
         for (environment, goal), rows in trials.items():
             if len(rows) < attempts and not rows[-1].success:

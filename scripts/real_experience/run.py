@@ -16,10 +16,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from lic_drake.errors import LibraryError
-from lic_drake.evaluate.experiment import Evaluation, run_evaluation
 from lic_drake.evaluate.statistics import Count, count
 from lic_drake.evaluate.table import Table, rate_cells
-from lic_drake.evaluate.trial import random_requests
+from lic_drake.evaluate.trial import Evaluation, random_requests, run_evaluation
 from lic_drake.evaluate.trials import TrialTable, read_trials
 from lic_drake.experience.add import add_rows, columns_of
 from lic_drake.experience.store import ExperienceLibrary

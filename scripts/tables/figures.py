@@ -13,9 +13,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from lic_drake.errors import LibraryError
-from lic_drake.evaluate.paper import TABLES, label
+from lic_drake.evaluate.paper import LEARNED, METHODS, TABLES, label
 from lic_drake.evaluate.statistics import count
-from lic_drake.evaluate.tables import LEARNED, METHODS
 from lic_drake.evaluate.trials import TrialTable
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.show.figures import save_figure

@@ -8,10 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
-from lic_drake.evaluate.paper import TABLES, label
+from lic_drake.evaluate.paper import (
+    METHODS,
+    TABLES,
+    label,
+    margins_table,
+    success_table,
+    t_test_table,
+)
 from lic_drake.evaluate.statistics import count, mcnemar
 from lic_drake.evaluate.table import Table, rate_cells
-from lic_drake.evaluate.tables import METHODS, margins_table, success_table, t_test_table
 from lic_drake.evaluate.trials import TrialTable
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.types import BoolVector

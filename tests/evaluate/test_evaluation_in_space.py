@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.made_up import small_cameras, sphere_library
 
-from lic_drake.evaluate.experiment import Evaluation, run_evaluation
+from lic_drake.evaluate.trial import Evaluation, run_evaluation
 from lic_drake.experience.store import ExperienceLibrary
 
 

@@ -8,8 +8,8 @@ from support.dask_cluster import dask_cluster
 from support.fake_reach import comparable, make_record, make_request
 
 from lic_drake.errors import LibraryError, RequestError
-from lic_drake.evaluate import experiment as dut
-from lic_drake.evaluate.experiment import Evaluation, run_evaluation
+from lic_drake.evaluate import trial as dut
+from lic_drake.evaluate.trial import Evaluation, run_evaluation
 from lic_drake.evaluate.trials import TrialRow, read_trials
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.experience.workers import DaskWorkers, LocalWorkers
@@ -76,7 +76,7 @@ def quiet(_: str) -> None:
 def test_strategies_are_tried_at_the_same_goals_of_the_same_environments(
     tmp_path: Path, calls: list[str]
 ) -> None:
-    asked = evaluation(tmp_path, first_environment=7)
+    asked = evaluation(tmp_path)
     lines: list[str] = []
     rows = run_evaluation(asked, say=lines.append)
     records = records_of(asked)
@@ -86,7 +86,7 @@ def test_strategies_are_tried_at_the_same_goals_of_the_same_environments(
         method: [(row.environment, row.goal) for row in firsts if row.method == method]
         for method in asked.methods
     }
-    assert tried["rnd"] == tried["gp1"] == [(e, g) for e in (7, 8, 9) for g in (0, 1)]
+    assert tried["rnd"] == tried["gp1"] == [(e, g) for e in range(3) for g in (0, 1)]
     for row in rows:
         record = records[row.key]
         assert (record.stream, record.environment) == ("evaluation", row.environment)
@@ -95,7 +95,7 @@ def test_strategies_are_tried_at_the_same_goals_of_the_same_environments(
     # Learned from the library: starts left of the middle succeed.
     assert all(records[row.key].start_y > 0.0 for row in firsts if row.method == "gp1")
     assert any(records[row.key].start_y < 0.0 for row in firsts if row.method == "rnd")
-    assert lines[-1].startswith(f"  3/3 environments, {len(rows)} attempts, gp1 ")
+    assert lines[-1].startswith(f"  3/3 environments, {len(rows)} attempts, 0 s left")
 
 
 def test_rows_agree_with_the_library_of_reaches(tmp_path: Path, calls: list[str]) -> None:
@@ -124,29 +124,32 @@ def test_rows_agree_with_the_library_of_reaches(tmp_path: Path, calls: list[str]
 def test_fresh_attempts_find_a_reset_environment_and_environments_may_share_goals(
     tmp_path: Path, calls: list[str]
 ) -> None:
-    asked = evaluation(
-        tmp_path, fresh=True, variant="fresh", common_goals=True, first_environment=4
-    )
+    asked = evaluation(tmp_path, fresh=True, variant="fresh", common_goals=True)
     rows = run_evaluation(asked, say=quiet)
     assert any(row.attempt == 2 for row in rows)
     assert {row.variant for row in rows} == {"fresh"}
     records, scenario = asked.reaches.records(), asked.reaches.scenario()
     assert all(record.after == () for record in records)
-    expected = {tuple(scenario.sample_goal("evaluation", 4, goal)) for goal in (0, 1)}
+    expected = {tuple(scenario.sample_goal("evaluation", 0, goal)) for goal in (0, 1)}
     assert {tuple(record.p_WG) for record in records} == expected
 
 
-def test_a_second_run_simulates_nothing_and_returns_the_same_rows(
+def test_a_second_run_simulates_nothing_and_a_larger_one_only_what_is_new(
     tmp_path: Path, calls: list[str]
 ) -> None:
-    asked = evaluation(tmp_path)
+    asked = evaluation(tmp_path, environments=2, goals=1, attempts=1)
     rows = without_times(run_evaluation(asked, say=quiet))
     content = comparable(asked.reaches.records())
+    first = set(calls)
     calls.clear()
     assert without_times(run_evaluation(asked, say=quiet)) == rows
     assert without_times(read_trials(asked.trials_path)) == rows
     assert calls == []
     assert comparable(asked.reaches.records()) == content
+    larger = run_evaluation(replace(asked, environments=3, goals=2, attempts=2), say=quiet)
+    assert calls and not set(calls) & first
+    # This includes RND's draws, which are independent of the number of trials.
+    assert set(rows) <= set(without_times(larger))
 
 
 def test_an_interrupted_evaluation_simulates_nothing_twice(
@@ -171,20 +174,7 @@ def test_an_interrupted_evaluation_simulates_nothing_twice(
     calls.clear()
     assert without_times(run_evaluation(asked, say=quiet)) == expected
     assert not kept & set(calls)
-    assert len(calls) == len(set(calls))
     assert kept | set(calls) == asked.reaches.successes().keys()
-    assert [path.name for path in asked.reaches.shard_paths()] == ["reaches.parquet"]
-
-
-def test_larger_evaluations_reuse_simulated_reaches(tmp_path: Path, calls: list[str]) -> None:
-    small = evaluation(tmp_path, environments=2, goals=1, attempts=1)
-    first = run_evaluation(small, say=quiet)
-    large = replace(small, environments=3, goals=2, attempts=2)
-    calls.clear()
-    rows = run_evaluation(large, say=quiet)
-    assert not set(calls) & {row.key for row in first}
-    # This includes RND's draws, which are independent of the number of trials.
-    assert set(without_times(first)) <= set(without_times(rows))
 
 
 def test_the_file_keeps_trials_of_other_variants_and_strategies(
@@ -201,21 +191,11 @@ def test_the_file_keeps_trials_of_other_variants_and_strategies(
     assert sorted(without_times(stored)) == sorted(without_times(expected))
 
 
-def test_one_strategy_may_follow_another(tmp_path: Path, calls: list[str]) -> None:
-    asked = evaluation(tmp_path, methods=("rnd", "cost", "rnd>cost"))
-    rows = run_evaluation(asked, say=quiet)
-    keys = {(row.method, row.environment, row.goal, row.attempt): row.key for row in rows}
-    combined = [trial for method, *trial in keys if method == "rnd>cost"]
-    assert any(attempt == 2 for *_, attempt in combined)
-    for environment, goal, attempt in combined:
-        if attempt == 1:
-            trial = (environment, goal, attempt)
-            assert keys["rnd>cost", *trial] == keys["rnd", *trial]
-
-
-def test_apertures_are_evaluated_with_bases(tmp_path: Path, calls: list[str]) -> None:
+def test_apertures_are_evaluated_with_bases_and_strategies_may_follow_others(
+    tmp_path: Path, calls: list[str]
+) -> None:
     make_library(tmp_path / "library", "cylinder-aperture-clutter")
-    asked = evaluation(tmp_path, methods=("rnd", "cost", "gp"), goals=1)
+    asked = evaluation(tmp_path, methods=("rnd", "cost", "gp", "rnd>cost"), goals=1)
     rows = run_evaluation(asked, say=quiet)
     scenario = asked.reaches.scenario()
     assert len({record.base_y for record in asked.reaches.records()}) > 3
@@ -223,7 +203,9 @@ def test_apertures_are_evaluated_with_bases(tmp_path: Path, calls: list[str]) ->
         p_WA = scenario.sample_instance("evaluation", record.environment).p_WA
         assert p_WA is not None
         assert np.linalg.norm(p_WA[:, :2] - record.start.x0[:2], axis=1).min() < 1e-9
-    assert {row.method for row in rows} == {"rnd", "cost", "gp"}
+    assert {row.method for row in rows} == set(asked.methods)
+    firsts = {m: [r.key for r in rows if (r.method, r.attempt) == (m, 1)] for m in asked.methods}
+    assert firsts["rnd>cost"] == firsts["rnd"] != firsts["cost"]
 
 
 def test_processes_and_a_cluster_give_the_rows_and_reaches_of_this_process(

@@ -5,10 +5,9 @@ import pytest
 from support.fake_reach import make_record
 
 from lic_drake.errors import LibraryError
-from lic_drake.evaluate import experiment
-from lic_drake.evaluate.experiment import Evaluation
+from lic_drake.evaluate import trial
 from lic_drake.evaluate.statistics import count
-from lic_drake.evaluate.trial import random_requests
+from lic_drake.evaluate.trial import Evaluation, random_requests
 from lic_drake.evaluate.trials import TrialTable, read_trials
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.experience.workers import Workers
@@ -31,7 +30,7 @@ def reach(request: ReachRequest) -> ReachRecord:
 def test_records_of_weight_turn_a_selection_that_the_simulation_had_wrong(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(experiment, "run_reach", reach)
+    monkeypatch.setattr(trial, "run_reach", reach)
     monkeypatch.setattr(script, "LocalWorkers", lambda _: Workers())
     shipped = ExperienceLibrary(shipped_library("passage-clutter"))
     few = ExperienceLibrary(tmp_path / "simulated")
