@@ -134,6 +134,23 @@ def output_of(script: str) -> str:
     return subprocess.run(command, capture_output=True, text=True, check=True).stdout
 
 
+def lines_with(pattern: str, *except_in: str) -> list[str]:
+    """Lines of the package that match a regular expression, but those of some rooms."""
+    return [
+        f"{path}: {line.strip()}"
+        for path in TREES
+        if path.parts[0] not in except_in
+        for line in (PACKAGE / path).read_text(encoding="utf-8").splitlines()
+        if re.search(pattern, line)
+    ]
+
+
+def test_only_robots_are_asked_what_kind_of_robot_they_are() -> None:
+    assert lines_with(r"isinstance\(.*(Planar|Pr2|Pointing)", "robots") == []
+    # Elsewhere the height of a torso is the third number of b0.
+    assert len(lines_with("torso_m", "robots", "clutter")) < 20
+
+
 def undocumented(tree: ast.Module) -> Iterator[str]:
     """Yields public names of a module that nothing is said about."""
     if not ast.get_docstring(tree):

@@ -6,7 +6,7 @@ extended without repeating its options.
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,7 @@ from lic_drake.experience.schema import write_atomically
 from lic_drake.experience.store import ExperienceLibrary, parse_same_scenario
 from lic_drake.experience.workers import Workers
 from lic_drake.reach.request import ReachRequest
-from lic_drake.reach.scenario import Scenario, to_dict
+from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.start import Starts
 from lic_drake.seeds import STREAMS
 from lic_drake.starts import training_starts
@@ -155,7 +155,7 @@ def _record_request(library: ExperienceLibrary, request: CollectionRequest) -> N
 def write_request(request: CollectionRequest, path: Path) -> None:
     """Writes a request as YAML, including the whole scenario."""
     content = "# What `lic collect` puts into this folder; seeds and values are complete.\n"
-    data = {**_values(request), "scenario": to_dict(request.scenario)}
+    data = {**_values(request), "scenario": asdict(request.scenario)}
     content += yaml.safe_dump(data, sort_keys=False)
     write_atomically(path, lambda temporary: temporary.write_text(content, encoding="utf-8"))
 

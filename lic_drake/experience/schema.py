@@ -8,7 +8,7 @@ the scenario, so that every file is self-contained.
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import fields
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ import yaml
 import lic_drake
 from lic_drake.errors import LibraryError, quoted, readable_errors
 from lic_drake.reach.request import ReachRecord
-from lic_drake.reach.scenario import Scenario, to_dict
+from lic_drake.reach.scenario import Scenario
 
 SCHEMA_VERSION = 4
 """Incremented with every change of the columns or the metadata."""
@@ -50,7 +50,7 @@ SCHEMA = schema_of(ReachRecord)
 
 def scenario_text(scenario: Scenario) -> str:
     """Returns a scenario as YAML that `parse_scenario` reads back."""
-    return yaml.safe_dump(to_dict(scenario), sort_keys=False)
+    return yaml.safe_dump(asdict(scenario), sort_keys=False)
 
 
 def to_table(records: Sequence[ReachRecord], scenario: Scenario) -> pa.Table:

@@ -15,7 +15,7 @@ from lic_drake.scene.scene import Scene, SceneConfig, add_scene, make_simulator
 from lic_drake.types import Vector
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class ReachDiagram:
     """A built diagram and what a rollout needs of it.
 
@@ -32,11 +32,9 @@ class ReachDiagram:
 
     def set_start(self, context: Context, q: Vector, p_RG: Vector) -> None:
         """Puts the arm at rest at q, with the goal p_RG, in a context of the diagram."""
-        plant = self.scene.plant
+        plant_context = self.scene.plant.GetMyMutableContextFromRoot(context)
         x = np.append(q, np.zeros(len(q)))
-        plant.SetPositionsAndVelocities(
-            plant.GetMyMutableContextFromRoot(context), self.scene.arm, x
-        )
+        self.scene.plant.SetPositionsAndVelocities(plant_context, self.scene.arm, x)
         self.controller.set_equilibrium(self.controller.GetMyMutableContextFromRoot(context), q)
         self.diagram.GetInputPort("goal").FixValue(context, p_RG)
 
@@ -88,10 +86,4 @@ def make_reach_diagram(
 
     diagram = builder.Build()
     diagram.set_name("reach")
-    return ReachDiagram(
-        diagram=diagram,
-        scene=scene,
-        config=scenario.scene,
-        sensor=sensor,
-        controller=controller,
-    )
+    return ReachDiagram(diagram, scene, scenario.scene, sensor, controller)

@@ -65,22 +65,17 @@ class Environment:
             p_WG: Goal, shape (3,), metres.
             x0: Start pose of the hand.
             keep_states: Whether the trace is to hold the whole scene.
-            q: Joint angles to begin with, shape (m,), radians; by default the first of the arm's
-                configurations for x0, in its order of preference, in which it touches nothing
-                (paper III-E).
+            q: Joint angles as in a `Start` (paper III-E).
         """
         p_RG, x0_R = p_WG - self.b0, Start(x0, self.b0).x0_R
         if not is_within_reach(self.scenario, p_RG):
             return ReachResult("unreachable", ReachTrace(), "the goal is beyond the arm's reach")
-        if q is not None and not self._is_at(q, x0_R):
-            return ReachResult(
-                "invalid_start", ReachTrace(), "the joint angles do not bring the hand to x0"
-            )
         angles = self.arm.solve_ik(x0_R) if q is None else q[None]
-        if not len(angles):
-            return ReachResult(
-                "invalid_start", ReachTrace(), "no configuration within the joint limits"
-            )
+        wrong = "" if len(angles) else "no configuration within the joint limits"
+        if q is not None and not self._is_at(q, x0_R):
+            wrong = "the joint angles do not bring the hand to x0"
+        if wrong:
+            return ReachResult("invalid_start", ReachTrace(), wrong)
         result = self._reach_from(angles, p_RG, keep_states)
         result.trace.translate(self.b0, clutter_too=self.instance.stems is None)
         return result

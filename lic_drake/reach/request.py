@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from dataclasses import dataclass, field, replace
+from dataclasses import MISSING, dataclass, field, replace
 from functools import cached_property
 from typing import Any, Self
 
@@ -28,7 +28,6 @@ class ReachRequest:
     """One reach to simulate. The record is a pure function of it; equal requests have equal keys.
 
     Attributes:
-        scenario: Category, robot, contact, controller and stop rules.
         stream: Seed stream of the environment, one of `lic_drake.seeds.STREAMS`.
         environment: Index of the environment in its stream.
         goal: p_WG, shape (3,), metres.
@@ -99,9 +98,8 @@ class ReachRequest:
 
     def before(self) -> "ReachRequest | None":
         """Returns the request of the reach that went before; None if it is the first."""
-        if not self.after:
-            return None
-        return replace(self, start=self.after[-1], after=self.after[:-1])
+        before = self.after[:-1]
+        return replace(self, start=self.after[-1], after=before) if self.after else None
 
     def then(self, start: Start) -> "ReachRequest":
         """Returns the request of a further reach to the same goal from another start."""
@@ -144,10 +142,9 @@ def _checked(scenario: Scenario, start: Start) -> Start:
 
 
 def flat_starts(after: tuple[Start, ...]) -> tuple[float, ...]:
-    """Returns starts as the numbers of the column `after`.
+    """Returns starts as the numbers of the column `after`: x0, the base, in space the torso.
 
-    They are x0, the base and in space the torso of each, and, if any has joint angles, those; NaN
-    for one without.
+    If any has joint angles, those follow, NaN for one without.
     """
     angles = next((len(start.q) for start in after if start.q is not None), 0)
     numbers: list[float] = []
@@ -172,8 +169,8 @@ def _read_after(record: "ReachRecord", angles: int) -> list[tuple[Start, ...]]:
     return found
 
 
-def _column(unit: str, doc: str, **options: Any) -> Any:
-    return field(metadata={"unit": unit, "doc": doc}, **options)
+def _column(unit: str, doc: str, default: Any = MISSING, *, compare: bool = True) -> Any:
+    return field(default=default, compare=compare, metadata={"unit": unit, "doc": doc})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -215,35 +212,32 @@ class ReachRecord:
     detail: str = _column("", "why a reach diverged or never began")
     lic_drake_version: str = _column("", "version of lic_drake")
     drake_version: str = _column("", "version of Drake")
-    base_x: float = _column("m", "base p_WR", default=0.0)
-    base_y: float = _column("m", "base p_WR", default=0.0)
+    base_x: float = _column("m", "base p_WR", 0.0)
+    base_y: float = _column("m", "base p_WR", 0.0)
     after: tuple[float, ...] = _column(
         "m, m, rad, m, m",
         "x0, p_WR and, in space, torso of each reach that went before",
-        default=(),
+        (),
     )
-    torso: float = _column("m", "height of the torso", default=0.0)
-    start_z: float = _column("m", "start pose x0", default=0.0)
-    start_qw: float = _column("", "start pose x0, quaternion; all 0 in the plane", default=0.0)
-    start_qx: float = _column("", "start pose x0, quaternion", default=0.0)
-    start_qy: float = _column("", "start pose x0, quaternion", default=0.0)
-    start_qz: float = _column("", "start pose x0, quaternion", default=0.0)
-    final_z: float = _column("m", "final hand pose x_inf", default=0.0)
-    final_qw: float = _column(
-        "", "final hand pose x_inf, quaternion; all 0 in the plane", default=0.0
-    )
-    final_qx: float = _column("", "final hand pose x_inf, quaternion", default=0.0)
-    final_qy: float = _column("", "final hand pose x_inf, quaternion", default=0.0)
-    final_qz: float = _column("", "final hand pose x_inf, quaternion", default=0.0)
-    final_vz: float = _column("m/s", "mean tip velocity of the last second of motion", default=0.0)
-    source: str = _column("", "who made the reach: simulation, a robot", default=SIMULATION)
-    weight: float = _column("", "how many simulated reaches the row counts as", default=1.0)
+    torso: float = _column("m", "height of the torso", 0.0)
+    start_z: float = _column("m", "start pose x0", 0.0)
+    start_qw: float = _column("", "start pose x0, quaternion; all 0 in the plane", 0.0)
+    start_qx: float = _column("", "start pose x0, quaternion", 0.0)
+    start_qy: float = _column("", "start pose x0, quaternion", 0.0)
+    start_qz: float = _column("", "start pose x0, quaternion", 0.0)
+    final_z: float = _column("m", "final hand pose x_inf", 0.0)
+    final_qw: float = _column("", "final hand pose x_inf, quaternion; all 0 in the plane", 0.0)
+    final_qx: float = _column("", "final hand pose x_inf, quaternion", 0.0)
+    final_qy: float = _column("", "final hand pose x_inf, quaternion", 0.0)
+    final_qz: float = _column("", "final hand pose x_inf, quaternion", 0.0)
+    final_vz: float = _column("m/s", "mean tip velocity of the last second of motion", 0.0)
+    source: str = _column("", "who made the reach: simulation, a robot", SIMULATION)
+    weight: float = _column("", "how many simulated reaches the row counts as", 1.0)
 
     @property
     def in_space(self) -> bool:
         """Whether the poses have a quaternion, so that the angles phi mean nothing (they are 0)."""
-        quaternion = (self.start_qw, self.start_qx, self.start_qy, self.start_qz)
-        return quaternion != (0.0, 0.0, 0.0, 0.0)
+        return any((self.start_qw, self.start_qx, self.start_qy, self.start_qz))
 
     @property
     def p_WG(self) -> Vector:

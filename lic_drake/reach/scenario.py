@@ -18,8 +18,7 @@ from lic_drake.config import merge, read_mapping, read_section
 from lic_drake.control.mpc import PRESETS, MpcConfig
 from lic_drake.errors import RequestError, ScenarioError
 from lic_drake.paths import scenarios_dir
-from lic_drake.reach.stop_rules import StopConfig
-from lic_drake.reach.task import Task
+from lic_drake.reach.task import StopConfig, Task
 from lic_drake.robots.arm import Arm
 from lic_drake.robots.registry import get_robot
 from lic_drake.scene.scene import SceneConfig
@@ -78,8 +77,7 @@ class Scenario:
     def goals(self, stream: str, environment: int) -> Vector:
         """Returns the goals p_WG that a collection tries in an environment, shape (n, 3), metres.
 
-        They are the grid of the goal area or random goals in it, or, without an area, the goal
-        that the environment offers.
+        They are the area's grid or random goals in it, or, without an area, the one on offer.
         """
         area = self.task.goal_area
         if area is None:
@@ -90,11 +88,6 @@ class Scenario:
         return np.array(
             [self.sample_goal(stream, environment, i) for i in range(area.random_goals)]
         )
-
-
-def to_dict(scenario: Scenario) -> dict[str, Any]:
-    """Returns the scenario's values as nested plain dictionaries."""
-    return dataclasses.asdict(scenario)
 
 
 def _identity(part: Any) -> dict[str, Any]:

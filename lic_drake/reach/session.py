@@ -25,6 +25,9 @@ MAX_ENDS = 10_000
 """Number of reaches of which it is remembered where they left the objects."""
 
 
+_DRAKE_VERSION = version("drake")
+
+
 class ReachSession:
     """Simulates requests one after another; a result depends on its request alone.
 
@@ -153,7 +156,7 @@ def make_record(request: ReachRequest, result: ReachResult, wall_time_s: float) 
         q_final=tuple(trace.q[-1].tolist()) if trace.q else (),
         detail=detail,
         lic_drake_version=lic_drake.__version__,
-        drake_version=_drake_version(),
+        drake_version=_DRAKE_VERSION,
         base_x=float(b0[0]),
         base_y=float(b0[1]),
         after=flat_starts(request.after),
@@ -161,8 +164,3 @@ def make_record(request: ReachRequest, result: ReachResult, wall_time_s: float) 
         final_vz=float(velocity[2]) if in_space else 0.0,
         **{"start_phi": 0.0, "final_phi": 0.0} | poses,
     )
-
-
-@cache
-def _drake_version() -> str:
-    return version("drake")

@@ -2,6 +2,7 @@
 
 import gc
 import math
+from collections import deque
 from collections.abc import Callable, Hashable
 
 import numpy as np
@@ -9,7 +10,7 @@ from pydrake.systems.analysis import Simulator
 
 from lic_drake.reach.diagram import ReachDiagram
 from lic_drake.reach.scenario import Scenario
-from lic_drake.reach.stop_rules import StopMonitor
+from lic_drake.reach.task import StopConfig
 from lic_drake.reach.trace import ReachResult, ReachTrace, SceneState
 from lic_drake.scene.collision import is_touching
 from lic_drake.types import Vector
@@ -61,12 +62,7 @@ class Simulation:
         self._rig = rig
 
     def begin(self, q: Vector, p_RG: Vector) -> None:
-        """Puts the arm at rest at q and everything movable where the environment has it.
-
-        Args:
-            q: Joint angles, shape (m,), radians.
-            p_RG: Goal, shape (3,), metres.
-        """
+        """Puts the arm at rest at q, (m,), and everything movable where the environment has it."""
         self._begin_in(self._rig, q, p_RG)
 
     def _begin_in(self, rig: Rig, q: Vector, p_RG: Vector, time_s: float = 0.0) -> None:
@@ -130,6 +126,52 @@ class Cache[T](dict[Hashable, T]):
         return item
 
 
+class StopMonitor:
+    """Follows a reach sample by sample and says when and how it ends."""
+
+    def __init__(self, config: StopConfig, p_WG: Vector, period_s: float) -> None:
+        self._config = config
+        self._p_WG = p_WG
+        # Tip positions and smallest distances from now back to so long ago, at the control period.
+        self._recent: deque[Vector] = deque(maxlen=_samples(config, period_s, config.stuck_time_s))
+        self._nearest: deque[float] = deque(
+            maxlen=_samples(config, period_s, config.progress_time_s)
+        )
+        self._low_force_time_s = 0.0
+        self.min_distance = np.inf
+
+    def update(self, time_s: float, p_WE: Vector, peak_force: float) -> str | None:
+        """Takes the largest taxel force, N, at a time and tip position p_WE, shape (3,), metres.
+
+        Returns:
+            The outcome if the reach ends with this sample, else None.
+        """
+        self._recent.append(p_WE)
+        distance = math.dist(p_WE, self._p_WG)
+        self.min_distance = min(self.min_distance, distance)
+        if distance < self._config.success_distance_m:
+            return "reached"
+        if peak_force <= self._config.force_limit_N:
+            self._low_force_time_s = time_s
+        elif time_s - self._low_force_time_s >= self._config.force_time_s - 1e-9:
+            return "force"
+        if len(self._recent) == self._recent.maxlen:
+            if math.dist(self._recent[-1], self._recent[0]) < self._config.stuck_distance_m:
+                return "stuck"
+        self._nearest.append(self.min_distance)
+        if len(self._nearest) == self._nearest.maxlen:
+            if self._nearest[0] - self.min_distance < self._config.progress_m:
+                return "stuck"
+        if time_s >= self._config.timeout_s - 1e-9:
+            return "timeout"
+        return None
+
+
+def _samples(config: StopConfig, period_s: float, window_s: float) -> int:
+    """Returns how many samples a window holds; one longer than the time-out never fills."""
+    return max(1, round(min(window_s, config.timeout_s + period_s) / period_s)) + 1
+
+
 def simulate(
     simulation: Simulation,
     scenario: Scenario,
@@ -137,14 +179,9 @@ def simulate(
     p_RG: Vector,
     keep_states: bool = False,
 ) -> ReachResult:
-    """Runs a simulation from rest at q0 until one of the scenario's stop rules ends it.
+    """Runs a simulation from rest at q0, (m,), radians, until a stop rule of the scenario ends it.
 
-    Args:
-        simulation: The environment.
-        scenario: Gives the arm, the control period and the stop rules.
-        q0: First joint angles, shape (m,), radians.
-        p_RG: Goal, shape (3,), metres.
-        keep_states: Whether the trace is to hold the whole scene.
+    The goal p_RG has shape (3,), metres. With `keep_states` the trace holds the whole scene.
     """
     arm, period_s = scenario.arm(), scenario.mpc.period_s
     simulation.begin(q0, p_RG)

@@ -91,8 +91,8 @@ class _Monitor:
         self._ends: Vector | None = None
         self._slack = 0.0
 
-    def _must_look(self, q: Vector, move: float = 0.0) -> bool:
-        """Takes the joint angles at a control instant and the largest move of an object, metres."""
+    def _must_look(self, q: Vector, move: float = 0.0) -> Vector | None:
+        """Takes joint angles and the largest move of an object, metres; returns ends to look at."""
         ends = self._axes.ends(q)
         if self._ends is not None:
             # No point of an axis moves further than the end that moves further.
@@ -101,7 +101,7 @@ class _Monitor:
             raise MovedTooFarError(f"{move:.3f} m in a control period")
         self._ends = ends
         self._slack -= move
-        return self._slack <= 0.0
+        return ends if self._slack <= 0.0 else None
 
     def _wake(self, woken: BoolVector, gaps: Vector) -> None:
         self.is_awake |= woken
@@ -137,10 +137,10 @@ class ObjectMonitor(_Monitor):
             if (pushed != self._pushed).any():
                 # What begins to move was no danger before.
                 self._pushed, self._slack = pushed, 0.0
-        if not self._must_look(q, move):
+        ends = self._must_look(q, move)
+        if ends is None:
             return []
-        assert self._ends is not None
-        gaps = self._chained_gaps(self._ends)
+        gaps = self._chained_gaps(ends)
         woken = (gaps < WAKE_M) & ~self.is_awake
         self._wake(woken, gaps)
         indices: list[int] = np.flatnonzero(woken).tolist()
@@ -174,12 +174,11 @@ class StemMonitor(_Monitor):
         Raises:
             MovedTooFarError: A stem may have been touched while it was asleep.
         """
-        if not self._must_look(q):
+        ends = self._must_look(q)
+        if ends is None:
             return False
-        assert self._ends is not None
         gaps = np.full(len(self.is_awake), np.inf)
-        near = self._axes.gaps(self._ends, self._p_WB) - self._radius
-        np.minimum.at(gaps, self._stem, near)
+        np.minimum.at(gaps, self._stem, self._axes.gaps(ends, self._p_WB) - self._radius)
         gaps[self.is_awake] = np.inf
         woken = (gaps < WAKE_M + GROUP_M) & (gaps.min(initial=np.inf) < WAKE_M)
         self._wake(woken, gaps)
@@ -227,7 +226,7 @@ def make_sleeping(world: World) -> "PartlyAsleep | None":
 
 
 class PartlyAsleep(Simulation):
-    """A simulation without what sleeps in it."""
+    """A simulation without what sleeps."""
 
     def __init__(self, world: World, num_axes: int) -> None:
         self._world = world
@@ -255,7 +254,6 @@ class SleepingObjects(PartlyAsleep):
 
     def __init__(self, world: World) -> None:
         super().__init__(world, world.instance.num_axes)
-        self._num_movable = int(np.count_nonzero(world.instance.movable))
         self._asleep: dict[int, tuple[Hashable, ClutterInstance]] = {}
 
     def begin(self, q: Vector, p_RG: Vector) -> None:
@@ -283,7 +281,7 @@ class SleepingObjects(PartlyAsleep):
         awake, state = self._monitor.awake, self._state(before)
         if len(awake) > len(self._rig.q_clutter_first):
             enough = max(FEWEST_SPARES, 1 << (len(awake) - 1).bit_length())
-            self._go_on_in(self._with_spares(min(enough, self._num_movable)), state.q)
+            self._go_on_in(self._with_spares(min(enough, len(self._monitor.p_WO))), state.q)
         spares = self._rig.state()
         p_WO, v_WO = spares.q_clutter.copy(), spares.v_clutter.copy()
         p_WO[: len(awake)], v_WO[: len(awake)] = state.q_clutter[awake], state.v_clutter[awake]

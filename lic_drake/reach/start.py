@@ -72,12 +72,9 @@ class Start:
 
 @dataclass(frozen=True, eq=False)
 class Starts:
-    """n initial conditions, as in `Start`.
+    """n initial conditions: as in `Start`, with a row for each.
 
-    Attributes:
-        x0: Shape (n, 3) or (n, 7).
-        b0: Shape (n, 3).
-        q: Shape (n, m), rows of NaN where they are left to the arm; None if they are all.
+    A row of q is NaN where joint angles are left to the arm; q is None if they are all.
     """
 
     x0: Vector

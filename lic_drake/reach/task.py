@@ -1,6 +1,8 @@
-"""Where a reach may start and where its goals lie (paper IV-A)."""
+"""Where a reach may start, where its goals lie (paper IV-A), and when it ends."""
 
+import dataclasses
 import itertools
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,6 +14,9 @@ from lic_drake.types import Vector
 
 MAX_GRID_STEPS = 1000
 """A finer grid than this in one direction is refused."""
+
+MAX_TIMEOUT_S = 3600.0
+"""Maximum simulated time of a reach; a longer one would take minutes to simulate."""
 
 
 @dataclass(kw_only=True)
@@ -155,16 +160,39 @@ class Task:
         return np.array([0.0, 0.0, self.torso_m])
 
 
+@dataclass(kw_only=True)
+class StopConfig:
+    """Limits of a reach; the paper states none of them."""
+
+    # A reach succeeds when the tip is this near the goal, metres (authors' batch scripts).
+    success_distance_m: float = 0.015
+    # A reach is stuck when the tip moved less than `stuck_distance_m` in `stuck_time_s`.
+    stuck_distance_m: float = 0.005
+    stuck_time_s: float = 3.0
+    # Where objects give way slowly: a reach is also stuck when its smallest distance to the goal
+    # fell by less than `progress_m` in `progress_time_s`; 0: this does not count.
+    progress_m: float = 0.0
+    progress_time_s: float = 3.0
+    # Simulated seconds after which a reach fails.
+    timeout_s: float = 30.0
+    # A reach fails when a taxel reads more than `force_limit_N` for `force_time_s` on end; a single
+    # sample of an impact does not count. The authors' controller shuts down at 15 N.
+    force_limit_N: float = 15.0
+    force_time_s: float = 0.1
+
+    def __post_init__(self) -> None:
+        # An infinite limit switches a rule off.
+        ranges = {item.name: (0.0, math.inf) for item in dataclasses.fields(self)}
+        ranges["timeout_s"] = (0.0, MAX_TIMEOUT_S)
+        check_numbers(self, positive=["success_distance_m"], ranges=ranges)
+
+
 def _check_range(name: str, low: float, high: float, step: float) -> None:
-    if not np.all(np.isfinite([low, high, step])) or high < low or step <= 0.0:
+    finite = np.all(np.isfinite([low, high, step]))
+    if not finite or not 0.0 <= high - low <= MAX_GRID_STEPS * step or step <= 0.0:
         raise ScenarioError(
-            f"{name}: needs finite numbers with min <= max and a positive step,"
-            f" got {low}..{high} step {step}"
-        )
-    if (high - low) / step > MAX_GRID_STEPS:
-        raise ScenarioError(
-            f"{name}: {low}..{high} has more than {MAX_GRID_STEPS} steps of {step};"
-            " choose a larger step"
+            f"{name}: needs finite numbers with min <= max and at most {MAX_GRID_STEPS} positive"
+            f" steps, got {low}..{high} step {step}"
         )
 
 

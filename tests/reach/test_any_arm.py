@@ -3,7 +3,6 @@
 import numpy as np
 from support.five_joint_arm import NAME
 
-from lic_drake.control.taxels import make_taxels
 from lic_drake.reach.request import ReachRequest
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.session import ReachSession
@@ -42,14 +41,3 @@ def test_it_pushes_spheres_aside_and_feels_them(session: ReachSession) -> None:
 
 def test_a_goal_beyond_its_length_is_out_of_reach(session: ReachSession) -> None:
     assert reach_in(session, 0.5).outcome == "unreachable"
-
-
-def test_its_taxels_are_all_over_its_capsules() -> None:
-    layout = make_taxels(ARM, SCENARIO.scene.taxels_per_m)
-    for link, shape in enumerate(ARM.skin):
-        p_SQ = (layout.p_LT[layout.link == link] - shape.p_LS) @ shape.R_LS
-        radius, length = shape.size
-        p_SQ[:, 2] -= np.clip(p_SQ[:, 2], -0.5 * length, 0.5 * length)
-        np.testing.assert_allclose(np.linalg.norm(p_SQ, axis=1), radius, atol=1e-12)
-        normals = layout.n_L[layout.link == link] @ shape.R_LS
-        np.testing.assert_allclose(normals, p_SQ / radius, atol=1e-12)

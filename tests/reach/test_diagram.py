@@ -61,11 +61,3 @@ def test_the_arm_rests_at_the_start_and_wants_to_stay_there(reach_diagram: Reach
     goal = reach_diagram.controller.GetInputPort("goal")
     controller_context = reach_diagram.controller.GetMyContextFromRoot(context)
     np.testing.assert_array_equal(goal.Eval(controller_context), P_WG)
-
-
-def test_contexts_share_nothing(reach_diagram: ReachDiagram) -> None:
-    q0 = start_angles(SCENARIO)
-    first = start_context(reach_diagram, q0, P_WG)
-    start_context(reach_diagram, q0 + 0.1, P_WG + 0.1)
-    state = reach_diagram.diagram.GetOutputPort("arm_state").Eval(first)
-    np.testing.assert_array_equal(state[:3], q0)

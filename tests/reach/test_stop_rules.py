@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lic_drake.errors import ScenarioError
-from lic_drake.reach.stop_rules import StopConfig, StopMonitor
+from lic_drake.reach.simulation import StopMonitor
+from lic_drake.reach.task import StopConfig
 
 PERIOD_S = 0.04
 FAR = np.array([10.0, 0.0, 0.0])
@@ -49,22 +50,9 @@ def test_a_straight_line_reaches_when_it_is_near_enough() -> None:
     assert ending(lambda t: 0.1 * t, p_WG=np.array([0.1, 0.0, 0.0])) == ("reached", 22)
 
 
-def test_distance_counts_in_all_directions() -> None:
-    # sqrt(0.3^2 + 0.4^2) = 0.5: 0.01 m off in y and z each keeps 0.0141 m.
-    goal = np.array([0.1, 0.01, 0.01])
-    assert ending(lambda t: 0.1, p_WG=goal) == ("reached", 0)
-    assert ending(lambda t: 0.1, p_WG=goal + [0.006, 0.0, 0.0])[0] == "stuck"
-
-
 def test_standing_still_is_stuck_after_exactly_four_seconds() -> None:
     assert ending(still) == ("stuck", 100)
     assert ending(still, period_s=0.01) == ("stuck", 400)
-
-
-def test_a_creep_below_the_limit_is_stuck_and_one_above_is_not() -> None:
-    # In 4 s: 1.6 mm and 2.4 mm; 30 s are 750 samples.
-    assert ending(lambda t: 0.0004 * t) == ("stuck", 100)
-    assert ending(lambda t: 0.0006 * t) == ("timeout", 750)
 
 
 def test_a_slow_reach_is_out_of_time_at_the_sample_of_the_timeout() -> None:
@@ -79,14 +67,6 @@ def test_force_ends_a_reach_when_it_is_over_the_limit_for_long_enough() -> None:
     assert ending(lambda t: 0.01 * t, lambda t: 10.0 * t) == ("force", 128)
     # At 100 Hz it is samples 500 and 510.
     assert ending(lambda t: 0.01 * t, lambda t: 10.0 * t, period_s=0.01) == ("force", 510)
-
-
-def test_impacts_of_a_sample_or_two_do_not_end_a_reach() -> None:
-    def knocks(samples: int) -> Callable[[float], float]:
-        return lambda t: 99.0 * (round(t / PERIOD_S) % 10 in range(1, 1 + samples))
-
-    assert ending(lambda t: 0.01 * t, knocks(2)) == ("timeout", 750)
-    assert ending(lambda t: 0.01 * t, knocks(3)) == ("force", 3)
 
 
 def test_a_force_that_is_no_number_counts_as_too_high() -> None:
@@ -105,12 +85,6 @@ def test_a_goal_that_is_reached_with_a_knock_is_reached() -> None:
 SLOW = replace(RULES, progress_m=0.01, progress_time_s=2.0)
 
 
-def test_a_goal_that_comes_nearer_too_slowly_is_not_waited_for() -> None:
-    # In 2 s: 8 mm and 12 mm. Both move more than the 2 mm in 4 s of the other rule.
-    assert ending(lambda t: 0.004 * t, config=SLOW) == ("stuck", 50)
-    assert ending(lambda t: 0.006 * t, config=SLOW) == ("timeout", 750)
-
-
 def test_a_motion_that_comes_no_nearer_than_before_makes_no_progress() -> None:
     def to_and_fro(t: float) -> float:
         """5 cm to and fro every 2 s, nearest at 0.5 s; the samples beside it are 4 um further."""
@@ -123,13 +97,6 @@ def test_a_motion_that_comes_no_nearer_than_before_makes_no_progress() -> None:
     assert ending(to_and_fro, config=moving) == ("timeout", 750)
     assert ending(lambda t: -0.05 * t, config=SLOW) == ("stuck", 50)
     assert ending(lambda t: -0.05 * t, config=RULES) == ("timeout", 750)
-
-
-def test_no_progress_wanted_switches_the_rule_off() -> None:
-    off = replace(SLOW, progress_m=0.0)
-    assert ending(lambda t: -0.05 * t, config=off) == ("timeout", 750)
-    assert ending(still, config=off) == ("stuck", 100)
-    assert StopConfig().progress_m == 0.0
 
 
 @pytest.mark.parametrize("stuck_time_s", [30.04, np.inf])

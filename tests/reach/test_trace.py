@@ -64,7 +64,3 @@ def test_forces_are_kept_as_peak_sum_and_number_of_loaded_taxels() -> None:
     assert trace.contacts == [0, 2, 1]
     # 12 N on three loaded taxels.
     assert trace.mean_force == 4.0
-
-
-def test_without_contact_the_mean_force_is_zero() -> None:
-    assert trace_of(np.zeros((5, 2))).mean_force == 0.0
