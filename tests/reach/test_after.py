@@ -84,7 +84,7 @@ def test_many_bases_and_histories_of_an_environment_do_not_mix(session: ReachSes
     session.environments.size, session.ends.size = 2, 1
     shorter = small_clutter(0.4)
     chain = [replace(request, scenario=shorter) for request in CHAIN]
-    chain += [from_base(0.02 * k, shorter) for k in range(3)]
+    chain += [from_base(0.02 * k, shorter) for k in range(2)]
     expected = [ReachSession(session.sleep).run(request) for request in chain]
     again = [session.run(request) for request in [*chain, *reversed(chain)]]
     assert comparable(again[: len(chain)]) == comparable(expected)
