@@ -1,7 +1,8 @@
-"""Contact properties: a compliant skin on the arm, rigid clutter."""
+"""Surfaces: a compliant skin on the arm, rigid clutter, and colours of clutter."""
 
 from dataclasses import dataclass
 
+import numpy as np
 from pydrake.geometry import (
     AddCompliantHydroelasticProperties,
     AddContactMaterial,
@@ -10,15 +11,32 @@ from pydrake.geometry import (
 )
 from pydrake.multibody.plant import CoulombFriction
 
+from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.config import check_numbers
-
-MESH_RANGE_M = (1e-4, 10.0)
-"""Range of contact mesh sizes; a finer mesh would not fit into memory."""
+from lic_drake.types import Vector
 
 _SKIN_FRICTION = 1e6
 # Drake combines two coefficients to 2 a b / (a + b). A skin with a very large coefficient gives
 # every arm-object pair twice the object's own: 0.4, against 0.2 between objects, the values of the
 # authors' simulator.
+
+FIXED_COLOR, MOVABLE_COLOR, STEM_COLOR, BRANCH_COLOR = np.array(
+    [
+        [0.55, 0.25, 0.2, 1.0],
+        [0.95, 0.7, 0.35, 1.0],
+        [0.3, 0.42, 0.16, 1.0],
+        [0.33, 0.24, 0.15, 1.0],
+    ]
+)
+"""RGBA of fixed and movable objects, of elastic stems and of fixed branches."""
+LEAF_COLORS = np.array([[0.13, 0.45, 0.12, 1.0], [0.2, 0.55, 0.16, 1.0], [0.3, 0.6, 0.2, 1.0]])
+"""Of leaves, alternating."""
+MATERIAL_COLORS = {
+    "wood": np.array([0.43, 0.27, 0.14, 1.0]),
+    "clay": np.array([0.52, 0.30, 0.24, 1.0]),
+    "cardboard": np.array([0.70, 0.55, 0.38, 1.0]),
+}
+"""Of the materials that a `ClutterInstance` may name."""
 
 
 @dataclass(kw_only=True)
@@ -44,7 +62,8 @@ class ContactConfig:
             self,
             positive=["skin_modulus_Pa", "object_stiffness_N_per_m"],
             non_negative=["dissipation_s_per_m", "object_friction"],
-            ranges={"skin_mesh_m": MESH_RANGE_M, "object_mesh_m": MESH_RANGE_M},
+            # A finer mesh would not fit into memory.
+            ranges={"skin_mesh_m": (1e-4, 10.0), "object_mesh_m": (1e-4, 10.0)},
         )
 
 
@@ -74,3 +93,9 @@ def object_properties(config: ContactConfig) -> ProximityProperties:
     )
     AddRigidHydroelasticProperties(config.object_mesh_m, properties)
     return properties
+
+
+def object_color(instance: ClutterInstance, i: int) -> Vector:
+    """Returns the colour of an object, shape (4,), by its material or else by its mobility."""
+    by_mobility = MOVABLE_COLOR if instance.movable[i] else FIXED_COLOR
+    return MATERIAL_COLORS.get(instance.material[i], by_mobility)

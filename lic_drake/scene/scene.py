@@ -1,26 +1,12 @@
 """Plant and scene graph from an arm, a clutter instance and a contact configuration."""
 
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
-from pydrake.geometry import (
-    Box,
-    Cylinder,
-    GeometryId,
-    RoleAssign,
-    SceneGraph,
-    Shape,
-    Sphere,
-)
+from pydrake.geometry import Box, Cylinder, GeometryId, RoleAssign, SceneGraph, Shape, Sphere
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
-from pydrake.multibody.tree import (
-    ModelInstanceIndex,
-    RigidBody,
-    SpatialInertia,
-    UnitInertia,
-)
+from pydrake.multibody.tree import ModelInstanceIndex, RigidBody, SpatialInertia, UnitInertia
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
@@ -29,18 +15,18 @@ from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.config import check_numbers
 from lic_drake.errors import ScenarioError
 from lic_drake.robots.arm import Arm
-from lic_drake.scene.contact import ContactConfig, object_properties, skin_properties
-from lic_drake.scene.looks import object_color
+from lic_drake.scene.contact import (
+    ContactConfig,
+    object_color,
+    object_properties,
+    skin_properties,
+)
 from lic_drake.scene.movables import add_movable, add_stems
 from lic_drake.types import Vector
 
-TIME_STEP_RANGE_S = (1e-5, 0.1)
-"""Range of a discrete plant's step."""
-CONTACT_APPROXIMATIONS = ("sap", "similar", "lagged")
-"""Drake's contact approximations for discrete plants."""
-STEP_SLACK = 1e-9
-"""Relative slack on the maximum step. Without it, round-off added a fifth, near-zero step to every
-other control period of four steps."""
+_STEP_SLACK = 1e-9
+# Relative slack on the maximum step. Without it, round-off added a fifth, near-zero step to every
+# other control period of four steps.
 
 
 @dataclass(kw_only=True)
@@ -67,15 +53,13 @@ class SceneConfig:
     contact: ContactConfig = field(default_factory=ContactConfig)
 
     def __post_init__(self) -> None:
-        shortest, longest = TIME_STEP_RANGE_S
-        if self.time_step_s != 0.0 and not shortest <= self.time_step_s <= longest:
+        if self.time_step_s != 0.0 and not 1e-5 <= self.time_step_s <= 0.1:
             raise ScenarioError(
-                f"time_step_s must be from {shortest:g} to {longest:g}, or 0,"
-                f" got {self.time_step_s}"
+                f"time_step_s must be from 1e-05 to 0.1, or 0, got {self.time_step_s}"
             )
-        if self.contact_approximation not in CONTACT_APPROXIMATIONS:
+        if self.contact_approximation not in ("sap", "similar", "lagged"):
             raise ScenarioError(
-                f"contact_approximation must be one of {', '.join(CONTACT_APPROXIMATIONS)},"
+                "contact_approximation must be one of sap, similar, lagged,"
                 f" got {self.contact_approximation!r}"
             )
         names = "cenic_accuracy cenic_max_step_s ground_friction_N ground_creep_m_per_s"
@@ -87,14 +71,11 @@ class Scene:
     """A finalized plant with its contents.
 
     Attributes:
-        plant: The plant.
-        scene_graph: Its scene graph.
         arm: Model instance of the robot.
         clutter: Model instance of the movable objects and stems.
         skin_links: Skin geometry -> index into the arm's link names.
         body: Collision geometry of the rest of the robot.
         objects: Collision geometry of each object of the instance.
-        robot: The arm.
         num_axes: Degrees of freedom of a movable object, see `ClutterInstance`.
     """
 
@@ -124,7 +105,7 @@ def add_scene(
     authors' planar objects exceeds any contact torque, so that they never spin.
 
     Args:
-        builder: The builder.
+        builder: Gets plant and scene graph.
         arm: The arm.
         instance: The clutter.
         config: Simulation parameters.
@@ -143,7 +124,16 @@ def add_scene(
     )
     plant.mutable_gravity_field().set_gravity_vector(np.zeros(3))
     arm_instance = arm.add_to_plant(plant, mobile=mobile, height_m=height_m)
-    skin_links = _add_skin(plant, scene_graph, arm, arm_instance, config.contact)
+    source = plant.get_source_id()
+    assert source is not None
+    skin_links = {
+        geometry: link
+        for link, name in enumerate(arm.link_names)
+        for geometry in plant.GetCollisionGeometriesForBody(plant.GetBodyByName(name, arm_instance))
+    }
+    skin, properties = skin_properties(config.contact), object_properties(config.contact)
+    for geometry in skin_links:
+        scene_graph.AssignRole(source, geometry, skin, RoleAssign.kReplace)
     clutter = plant.AddModelInstance("clutter")
     objects: list[GeometryId] = []
     surroundings = _add_surroundings(plant)
@@ -168,20 +158,11 @@ def add_scene(
             color = object_color(instance, i)
             plant.RegisterVisualGeometry(body, X_BO, shape, f"{name}_visual", color)
         objects.append(
-            plant.RegisterCollisionGeometry(
-                body, X_BO, shape, f"{name}_collision", object_properties(config.contact)
-            )
+            plant.RegisterCollisionGeometry(body, X_BO, shape, f"{name}_collision", properties)
         )
     if instance.stems is not None:
-        add_stems(
-            plant,
-            scene_graph,
-            clutter,
-            instance.stems,
-            partial(object_properties, config.contact),
-            objects,
-            visuals,
-        )
+        stems = instance.stems
+        add_stems(plant, scene_graph, clutter, stems, properties, objects, visuals)
     plant.Finalize()
     # Dry friction and springs are actuators whose desired state is 0.
     at_rest = plant.get_desired_state_input_port(clutter)
@@ -209,17 +190,14 @@ def add_scene(
 def make_simulator(
     diagram: Diagram, config: SceneConfig, context: Context | None = None
 ) -> Simulator:
-    """Returns a simulator of a diagram with a scene, with the integrator that the plant needs.
+    """Returns a simulator of a scene's diagram in a context, by default a new one.
 
-    Args:
-        diagram: The diagram.
-        config: The scene's parameters.
-        context: A context of the diagram; a new one by default.
+    It has the integrator that the plant needs.
     """
     context = diagram.CreateDefaultContext() if context is None else context
     simulator = Simulator(diagram, context)
     if config.time_step_s == 0.0:
-        longest_s = config.cenic_max_step_s * (1.0 + STEP_SLACK)
+        longest_s = config.cenic_max_step_s * (1.0 + _STEP_SLACK)
         simulator_config = SimulatorConfig(
             integration_scheme="cenic",
             accuracy=config.cenic_accuracy,
@@ -230,26 +208,6 @@ def make_simulator(
         # Instead of a tenth of it: nearly all steps have the maximum length.
         simulator.get_mutable_integrator().request_initial_step_size_target(longest_s)
     return simulator
-
-
-def _add_skin(
-    plant: MultibodyPlant,
-    scene_graph: SceneGraph,
-    arm: Arm,
-    arm_instance: ModelInstanceIndex,
-    contact: ContactConfig,
-) -> dict[GeometryId, int]:
-    """Makes the arm's collision geometry compliant; returns geometry -> link index."""
-    source = plant.get_source_id()
-    assert source is not None
-    skin_links = {}
-    for link, name in enumerate(arm.link_names):
-        for geometry in plant.GetCollisionGeometriesForBody(
-            plant.GetBodyByName(name, arm_instance)
-        ):
-            scene_graph.AssignRole(source, geometry, skin_properties(contact), RoleAssign.kReplace)
-            skin_links[geometry] = link
-    return skin_links
 
 
 def _add_surroundings(plant: MultibodyPlant) -> RigidBody:
@@ -274,10 +232,6 @@ def pose_of(instance: ClutterInstance, i: int) -> RigidTransform:
 
 def make_shape(shape: str, size: Vector) -> Shape:
     """Returns Drake's shape for a `ClutterInstance` entry."""
-    match shape:
-        case "cylinder":
-            return Cylinder(size[0], size[1])
-        case "box":
-            return Box(size)
-        case _:
-            return Sphere(size[0])
+    if shape == "box":
+        return Box(size)
+    return Cylinder(size[0], size[1]) if shape == "cylinder" else Sphere(size[0])

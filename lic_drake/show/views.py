@@ -14,7 +14,7 @@ from lic_drake.reach.session import simulate_request
 from lic_drake.reach.start import Starts
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.robots.arm import Arm
-from lic_drake.scene.looks import FIXED_COLOR, MOVABLE_COLOR, STEM_COLOR
+from lic_drake.scene.contact import FIXED_COLOR, MOVABLE_COLOR, STEM_COLOR
 from lic_drake.show.figures import ATTEMPT_COLORS
 from lic_drake.starts import make_starts
 from lic_drake.types import Vector

@@ -15,7 +15,7 @@ from lic_drake.clutter.registry import category_names
 from lic_drake.errors import LicError
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.trace import ReachTrace
-from lic_drake.scene.looks import FIXED_COLOR, MOVABLE_COLOR
+from lic_drake.scene.contact import FIXED_COLOR, MOVABLE_COLOR
 from lic_drake.show.figures import ATTEMPT_COLORS, save_figure
 from lic_drake.show.views import FRONT, SIDE, draw_view
 from lic_drake.starts import make_starts
