@@ -49,13 +49,10 @@ class ReachDiagram:
 def make_reach_diagram(
     scenario: Scenario, instance: ClutterInstance, height_m: float | None = None
 ) -> ReachDiagram:
-    """Builds the diagram of one environment.
+    """Builds the diagram of one environment, with the clutter in R.
 
-    Args:
-        scenario: Robot, contact, controller.
-        instance: The clutter, in R.
-        height_m: How far R is above the robot's floor, metres; by default as the task has it. It
-            only moves the robot's body.
+    R is `height_m` above the robot's floor, which only moves the robot's body; by default as the
+    task has it.
     """
     builder = DiagramBuilder()
     arm = scenario.arm()

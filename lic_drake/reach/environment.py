@@ -26,8 +26,6 @@ class Environment:
     reach: the environment is moved by -b0 instead (T_b0 of paper Eq. 3).
 
     Args:
-        scenario: Robot, contact, controller, stop rules.
-        instance: The clutter.
         sleep: Whether objects may sleep until the arm comes near (`lic_drake.reach.sleeping`);
             without, a reach costs three times as much and ends the same.
         b0: Base and torso, as of a `Start`; by default as the scenario's task has it.

@@ -18,8 +18,7 @@ SIMULATION = "simulation"
 """Source of the records that lic_drake has simulated."""
 
 OUTCOMES = ("reached", "stuck", "force", "timeout", "diverged", "invalid_start", "unreachable")
-"""How a reach can end: at the goal; without progress; by the force stop; out of time; by a
-failure of the simulator; before it began, because the arm cannot stand at the start or because
+"""How a reach can end; the last two before it began, because the arm cannot stand at the start or
 the goal is further away than the arm is long."""
 
 
@@ -83,10 +82,8 @@ class ReachRequest:
 
     @classmethod
     def from_record(cls, record: "ReachRecord", scenario: Scenario) -> Self:
-        """Returns the request that a record of a scenario answers.
-
-        A record holds the joint angles in any case; its key tells whether they were prescribed.
-        """
+        """Returns the request that a record of a scenario answers."""
+        # A record holds the joint angles in any case; its key tells whether they were prescribed.
         start = record.start
         plain = Start(start.x0, start.b0)
         found = [

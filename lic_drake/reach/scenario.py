@@ -75,10 +75,7 @@ class Scenario:
         return np.asarray(goals[index])
 
     def goals(self, stream: str, environment: int) -> Vector:
-        """Returns the goals p_WG that a collection tries in an environment, shape (n, 3), metres.
-
-        They are the area's grid or random goals in it, or, without an area, the one on offer.
-        """
+        """Returns the goals that a collection tries in an environment, shape (n, 3), metres."""
         area = self.task.goal_area
         if area is None:
             p_WG = self.sample_instance(stream, environment).p_WG

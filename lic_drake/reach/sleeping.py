@@ -23,11 +23,8 @@ from lic_drake.scene.scene import make_shape, pose_of
 from lic_drake.types import BoolVector, IntVector, Vector
 
 WAKE_M = 0.02
-"""What sleeps wakes up when the gap between it and the arm, or a pushed object, is smaller.
-
-Nothing that moves less than this in a control period can touch an object asleep: at the last
-control instant before the touch the gap would have been smaller, and the object woken.
-"""
+"""What sleeps wakes up when the gap between it and the arm, or a pushed object, is smaller. Nothing
+that moves less than this in a control period can touch it before."""
 
 MAX_MOVE_M = 0.8 * WAKE_M
 """Largest move of the skin or an object in a control period for which waking up is in time. In
@@ -51,7 +48,7 @@ PARKING_M = 100.0
 
 
 class MovedTooFarError(Exception):
-    """Something moved further in a control period than `MAX_MOVE_M`."""
+    """Something moved further than `MAX_MOVE_M`, and may have touched what was asleep."""
 
 
 class SkinAxes:
@@ -121,13 +118,7 @@ class ObjectMonitor(_Monitor):
         self.awake: list[int] = []
 
     def look(self, q: Vector, p_WO_awake: Vector) -> list[int]:
-        """Takes the state at a control instant; returns what wakes up, in ascending order.
-
-        `p_WO_awake` has the positions of what is awake, shape (k, num_axes), as it woke up.
-
-        Raises:
-            MovedTooFarError: An object may have been touched while it was asleep.
-        """
+        """Takes q and what is awake, shape (k, num_axes), as it woke up; returns what wakes up."""
         move = 0.0
         if self.awake:
             d = p_WO_awake - self.p_WO[self.awake]
@@ -169,11 +160,7 @@ class StemMonitor(_Monitor):
         self._p_WB, self._radius, self._stem = _balls(stems)
 
     def look(self, q: Vector) -> bool:
-        """Takes the joint angles at a control instant; returns whether any stem wakes up.
-
-        Raises:
-            MovedTooFarError: A stem may have been touched while it was asleep.
-        """
+        """Takes the joint angles at a control instant; returns whether any stem wakes up."""
         ends = self._must_look(q)
         if ends is None:
             return False

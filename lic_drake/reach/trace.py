@@ -35,13 +35,11 @@ class ReachTrace:
     Attributes:
         q: Joint angles, each shape (m,), radians.
         p_WE: Tip positions, each shape (3,), metres.
-        peak_force: Largest taxel force of each sample, N.
-        total_force: Sum of the taxel forces, N.
+        peak_force: Largest taxel force of each sample, N; total_force their sum.
         contacts: Number of loaded taxels.
         states: The state of the scene at each sample, if it was asked for.
         b0: Position of R, shape (3,), metres.
-        q_clutter: As in `SceneState`, when the reach ended; None where it never began or is not
-            finite.
+        q_clutter: As in `SceneState`, at the end; None where there is none or it is not finite.
     """
 
     time_s: list[float] = field(default_factory=list)

@@ -8,7 +8,7 @@ from support.worlds import cylinder, make_clutter
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.reach.environment import Environment
 from lic_drake.reach.request import ReachRequest
-from lic_drake.reach.scenario import Scenario, load_scenario
+from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.session import make_record
 from lic_drake.reach.start import Start
 from lic_drake.reach.trace import ReachResult
@@ -122,16 +122,3 @@ def test_objects_that_touch_each_other_are_no_reason_to_refuse_a_start(
     for objects in (pair, []):
         environment = Environment(scenario, make_clutter(*objects, at_the_hand), sleep=sleep)
         assert environment.reach(P_WG, X0).outcome == "invalid_start"
-
-
-def test_a_reach_through_an_aperture_touches_no_wall_where_there_is_room() -> None:
-    scenario = load_scenario(
-        "cylinder-aperture-clutter",
-        "{clutter: {num_movable: 0, num_fixed: 0}, stop: {timeout_s: 10}}",
-    )
-    p_WA = scenario.sample_instance("training", 0).p_WA
-    assert p_WA is not None
-    base = np.array([0.0, p_WA[1, 1] + 0.2, 0.0])
-    environment = Environment(scenario, scenario.sample_instance("training", 0), b0=base)
-    result = environment.reach(p_WA[1] + [0.2, 0.05, 0.0], np.array([*p_WA[1, :2], 0.3]))
-    assert result.outcome == "reached"

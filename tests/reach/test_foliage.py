@@ -25,13 +25,6 @@ def result(environment: Environment) -> ReachResult:
     return environment.reach(GOAL, X0, keep_states=True)
 
 
-def test_starts_lie_in_apertures_that_nothing_covers() -> None:
-    assert INSTANCE.p_WA is not None and INSTANCE.stems is not None
-    assert len(STARTS.x0) >= 8
-    apart = np.linalg.norm(STARTS.x0[:, None, :3] - INSTANCE.p_WA, axis=2)
-    np.testing.assert_allclose(apart.min(axis=1), 0.0, atol=1e-6)
-
-
 def test_an_arm_pushes_stems_aside_and_feels_it(result: ReachResult) -> None:
     assert result.outcome in ("reached", "stuck", "timeout")
     assert result.trace.q_clutter is not None

@@ -20,24 +20,6 @@ STARTS = SCENARIO.task.start_line.grid(ARM)
 INSTANCES = [SCENARIO.sample_instance("training", index) for index in range(200)]
 
 
-def test_it_has_the_papers_14_starts() -> None:
-    # By hand from the joint limits: for each y the orientations of the 9 x 5 grid that remain.
-    possible = {
-        -0.4: [0],
-        -0.3: [0, 45],
-        -0.2: [0, 45],
-        -0.1: [45, 90],
-        0.0: [45, 90],
-        0.1: [45, 90],
-        0.2: [90],
-        0.3: [90],
-        0.4: [90],
-    }
-    found = {(y, round(np.rad2deg(phi))) for _, y, phi in STARTS}
-    assert len(STARTS) == 14
-    assert found == {(y, phi) for y, angles in possible.items() for phi in angles}
-
-
 def test_the_walls_keep_clear_of_the_start_line_and_of_the_arm_at_every_start() -> None:
     # Of the whole family of passages, its corners included.
     extremes = [

@@ -1,4 +1,3 @@
-import dataclasses
 import math
 from dataclasses import replace
 
@@ -11,7 +10,7 @@ from lic_drake.errors import RequestError
 from lic_drake.experience.schema import to_records
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
-from lic_drake.reach.request import ReachRecord, ReachRequest, check_goal
+from lic_drake.reach.request import ReachRequest, check_goal
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.session import make_record as real_record
 from lic_drake.reach.start import Start
@@ -83,19 +82,6 @@ def test_a_record_leads_back_to_prescribed_joint_angles(
     assert ReachRequest.from_record(real_record(request, nothing, 0.0), scenario) == request
     keys = {replace(request, start=replace(start, q=q)).key for q in (None, np.full(7, 0.1))}
     assert len(keys) == 2
-
-
-def test_records_are_compared_without_their_wall_time() -> None:
-    record = next(
-        record
-        for environment in range(9)
-        if (record := make_record(reach_request(SCENARIO, environment=environment))).detail == ""
-    )
-    assert record == replace(record, wall_time_s=record.wall_time_s + 1.0)
-    for item in dataclasses.fields(ReachRecord):
-        value = getattr(record, item.name)
-        if item.name != "wall_time_s":
-            assert record != replace(record, **{item.name: (value, "changed")}), item.name
 
 
 @pytest.mark.parametrize(

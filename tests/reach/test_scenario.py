@@ -2,7 +2,6 @@ import copy
 import dataclasses
 import math
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -57,14 +56,8 @@ def test_the_papers_numbers_are_the_scenarios() -> None:
     assert scenario.mpc.force_threshold_N == 5.0
 
 
-def test_a_path_works_like_a_name(tmp_path: Path) -> None:
-    path = tmp_path / "mine.yml"
-    path.write_text(TEXT, encoding="utf-8")
-    assert load_scenario(path) == load_scenario("cylinder-clutter")
-
-
 def test_overrides_replace_single_values_at_every_level() -> None:
-    plain = load_scenario("cylinder-clutter")
+    plain = load_scenario(scenarios_dir() / "cylinder-clutter.yaml")
     changed = load_scenario(
         "cylinder-clutter",
         "{stop: {timeout_s: 7}, scene: {contact: {object_friction: 0.5}},"

@@ -73,13 +73,6 @@ def test_a_force_that_is_no_number_counts_as_too_high() -> None:
     assert ending(lambda t: 0.01 * t, lambda t: np.nan) == ("force", 3)
 
 
-def test_a_goal_that_is_reached_with_a_knock_is_reached() -> None:
-    goal = np.array([0.1, 0.0, 0.0])
-    # Over the limit from sample 20 or 19 on, three samples before the goal or four.
-    assert ending(lambda t: 0.1 * t, lambda t: 99.0 * (t > 0.79), goal) == ("reached", 22)
-    assert ending(lambda t: 0.1 * t, lambda t: 99.0 * (t > 0.75), goal) == ("force", 21)
-
-
 # Progress towards the goal
 
 SLOW = replace(RULES, progress_m=0.01, progress_time_s=2.0)

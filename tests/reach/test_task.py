@@ -15,24 +15,29 @@ ARM = planar_arm()
 TASK = load_scenario("cylinder-clutter").task
 
 
-def test_the_start_grid_has_the_papers_21_initial_conditions() -> None:
-    # By hand from the joint limits: for each y the orientations of the 9 x 7 grid that remain.
-    possible = {
-        -0.4: [-30, 0],
-        -0.3: [-30, 0, 30],
-        -0.2: [0, 30, 60],
-        -0.1: [30, 60, 90],
-        0.0: [30, 60, 90],
-        0.1: [60, 90],
-        0.2: [60, 90],
-        0.3: [60, 90],
-        0.4: [90],
+# By hand from the joint limits: where on the line each orientation in degrees is possible, dm.
+@pytest.mark.parametrize(
+    ("name", "possible"),
+    [
+        (
+            "cylinder-clutter",
+            21,
+            {-30: (-4, -3), 0: (-4, -2), 30: (-3, 0), 60: (-2, 3), 90: (-1, 4)},
+        ),
+        ("passage-clutter", {0: (-4, -2), 45: (-3, 1), 90: (-1, 4)}),
+    ],
+)
+def test_start_grids_have_the_papers_initial_conditions(
+    name: str, possible: dict[int, tuple[int, int]]
+) -> None:
+    line = load_scenario(name).task.start_line
+    grid = line.grid(ARM)
+    assert len(grid) == (21 if name == "cylinder-clutter" else 14)
+    assert set(grid[:, 0]) == {line.x_m}
+    found = {(round(np.rad2deg(phi)), round(10.0 * y)) for _, y, phi in grid}
+    assert found == {
+        (phi, y) for phi, (low, high) in possible.items() for y in range(low, high + 1)
     }
-    grid = TASK.start_line.grid(ARM)
-    assert grid.shape == (21, 3)
-    assert set(grid[:, 0]) == {TASK.start_line.x_m}
-    found = {(y, round(np.rad2deg(phi))) for _, y, phi in grid}
-    assert found == {(y, phi) for y, angles in possible.items() for phi in angles}
 
 
 def test_the_goal_grid_has_the_papers_45_goals() -> None:
