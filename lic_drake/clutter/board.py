@@ -4,16 +4,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from lic_drake.clutter.instance import ClutterInstance, join, make_objects
-from lic_drake.clutter.placement import place_discs
+from lic_drake.clutter.instance import ClutterInstance, join, make_objects, place_discs
 from lic_drake.config import check_numbers
 from lic_drake.errors import ScenarioError
 from lic_drake.types import IntVector, Vector
 
-MAX_APERTURES = 20
-"""Maximum number of rows or columns of a board."""
-MAX_SPHERES = 1000
-"""Maximum number of spheres; more would be too slow to simulate."""
+# Maximum number of rows or columns of a board, and of spheres: more are too slow to simulate.
+_MAX_APERTURES, _MAX_SPHERES = 20, 1000
 
 
 @dataclass(kw_only=True)
@@ -24,9 +21,8 @@ class ApertureBoard:
     board_centre: list[float] = field(default_factory=lambda: [0.53, -0.29, 0.89])
     columns: int = 5
     rows: int = 4
-    # Distance of neighbouring apertures' centres, and width and thickness of the bars between
-    # them, metres. The bars narrow the apertures, as the poles of the authors' planar generator do:
-    # with centres 0.2 m apart (paper IV-B) there is no other room.
+    # Distance of neighbouring apertures' centres (paper IV-B), and width and thickness of the bars
+    # between them, metres, which narrow the apertures: there is no other room.
     aperture_m: float = 0.2
     bar_m: float = 0.01
     # Number of randomly chosen apertures that are blocked.
@@ -37,8 +33,7 @@ class ApertureBoard:
             self,
             positive=["aperture_m", "bar_m"],
             ranges={
-                "columns": (1, MAX_APERTURES),
-                "rows": (1, MAX_APERTURES),
+                **dict.fromkeys(("columns", "rows"), (1, _MAX_APERTURES)),
                 "num_blocked": (0, self.rows * self.columns - 1),
             },
             vectors={"board_centre": 3},
@@ -74,12 +69,9 @@ class ApertureBoard:
     def blocked_board(self, blocked: IntVector) -> ClutterInstance:
         """Returns the board with the apertures at these indices covered."""
         p_WA = self.aperture_centres()
-        cover = [self.bar_m, self.aperture_m, self.aperture_m]
-        return join(
-            self.bare_board(),
-            make_objects("box", cover, p_WA[blocked]),
-            p_WA=np.delete(p_WA, blocked, axis=0),
-        )
+        edges = [self.bar_m, self.aperture_m, self.aperture_m]
+        covers = make_objects("box", edges, p_WA[blocked])
+        return join(self.bare_board(), covers, p_WA=np.delete(p_WA, blocked, axis=0))
 
 
 @dataclass(kw_only=True)
@@ -102,7 +94,7 @@ class SphereApertureClutter(ApertureBoard):
         check_numbers(
             self,
             positive=["radius_m", "mass_kg"],
-            ranges={"num_spheres": (0, MAX_SPHERES)},
+            ranges={"num_spheres": (0, _MAX_SPHERES)},
             vectors={"lower": 3, "upper": 3},
             ascending=[("lower", "upper")],
         )
@@ -113,11 +105,7 @@ class SphereApertureClutter(ApertureBoard):
             )
 
     def sample(self, rng: np.random.Generator) -> ClutterInstance:
-        """Samples an environment; its spheres do not depend on `num_blocked`.
-
-        Raises:
-            ScenarioError: The spheres do not fit into the box.
-        """
+        """Samples an environment; its spheres do not depend on `num_blocked`."""
         n = self.num_spheres
         centres = place_discs(rng, n, self.lower, self.upper, 2.0 * self.radius_m)
         spheres = make_objects("sphere", [self.radius_m], centres, mass=self.mass_kg, movable=True)

@@ -4,15 +4,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from lic_drake.clutter.instance import ClutterInstance, join, make_objects
-from lic_drake.clutter.placement import place_discs
+from lic_drake.clutter.instance import ClutterInstance, join, make_objects, place_discs
 from lic_drake.config import check_numbers
 from lic_drake.errors import ScenarioError
 
-MAX_OBJECTS = 2000
-"""Maximum number of objects; more would be too slow to simulate."""
-MAX_APERTURES = 50
-"""Maximum number of openings in a barrier."""
+# Maximum number of objects, more are too slow to simulate, and of openings in a barrier.
+_MAX_OBJECTS, _MAX_APERTURES = 2000, 50
 
 
 @dataclass(kw_only=True)
@@ -35,26 +32,17 @@ class CylinderClutter:
         check_numbers(
             self,
             positive=["radius_m", "length_m", "mass_kg"],
-            ranges={"num_movable": (0, MAX_OBJECTS), "num_fixed": (0, MAX_OBJECTS)},
+            ranges=dict.fromkeys(("num_movable", "num_fixed"), (0, _MAX_OBJECTS)),
             vectors={"lower": 2, "upper": 2},
             ascending=[("lower", "upper")],
         )
 
     def sample(self, rng: np.random.Generator) -> ClutterInstance:
-        """Samples an environment with uniform centres and without overlap.
-
-        Raises:
-            ScenarioError: The cylinders do not fit into the rectangle.
-        """
+        """Samples an environment with uniform centres and without overlap."""
         n = self.num_movable + self.num_fixed
         centres = place_discs(rng, n, self.lower, self.upper, 2.0 * self.radius_m)
-        return make_objects(
-            "cylinder",
-            [self.radius_m, self.length_m],
-            centres,
-            mass=self.mass_kg,
-            movable=np.arange(n) < self.num_movable,
-        )
+        size, movable = [self.radius_m, self.length_m], np.arange(n) < self.num_movable
+        return make_objects("cylinder", size, centres, mass=self.mass_kg, movable=movable)
 
 
 @dataclass(kw_only=True)
@@ -82,7 +70,7 @@ class CylinderApertureClutter(CylinderClutter):
             self,
             finite=["barrier_x_m", "aperture_y_min_m", "aperture_y_max_m"],
             positive=["barrier_length_m", "barrier_thickness_m", "aperture_width_m"],
-            ranges={"num_apertures": (1, MAX_APERTURES)},
+            ranges={"num_apertures": (1, _MAX_APERTURES)},
             ascending=[("aperture_y_min_m", "aperture_y_max_m")],
         )
         low, high = self.aperture_y_min_m, self.aperture_y_max_m
@@ -99,11 +87,7 @@ class CylinderApertureClutter(CylinderClutter):
             )
 
     def sample(self, rng: np.random.Generator) -> ClutterInstance:
-        """Samples cylinders as in cylinder-clutter, then uniform openings two widths apart.
-
-        Raises:
-            ScenarioError: Cylinders or openings do not fit.
-        """
+        """Samples cylinders as in cylinder-clutter, then uniform openings two widths apart."""
         cylinders = super().sample(rng)
         x = self.barrier_x_m
         low, high = [x, self.aperture_y_min_m], [x, self.aperture_y_max_m]

@@ -5,23 +5,26 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from lic_drake.clutter.board import ApertureBoard
-from lic_drake.clutter.instance import ClutterInstance, Stems, join, make_objects
-from lic_drake.clutter.placement import MAX_TRIES, place_discs
+from lic_drake.clutter.instance import (
+    MAX_TRIES,
+    ClutterInstance,
+    Stems,
+    join,
+    make_objects,
+    place_discs,
+)
 from lic_drake.config import check_numbers
 from lic_drake.errors import ScenarioError
 from lic_drake.types import BoolVector, Vector
 
-MAX_STEMS = 300
-"""Maximum number of stems, and of branches."""
-MAX_LEAVES = 50
-"""Maximum number of leaves on a stem or branch."""
+# Maximum numbers of stems, of branches, and of leaves on each.
+_MAX_STEMS, _MAX_LEAVES = 300, 50
 
 
 @dataclass(kw_only=True)
 class FoliageApertureClutter(ApertureBoard):
-    """Parameters of the board and of the foliage behind it.
+    """Board and foliage, which the paper shows (Fig. 1) without giving numbers.
 
-    The paper shows artificial foliage (Fig. 1) without numbers:
     `models/scenarios/foliage-aperture-clutter.yaml` says how these were chosen.
     """
 
@@ -62,27 +65,24 @@ class FoliageApertureClutter(ApertureBoard):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        lengths = ("stem_length_m", "branch_length_m", "leaf_length_m", "leaf_width_m")
         check_numbers(
             self,
             positive=(
                 *("cover_m", "margin_m", "trough_m", "root_distance_m", "stem_radius_m"),
                 *("branch_radius_m", "rigidity_N_m2", "stem_kg_per_m", "damping_ratio"),
-                *("leaf_thickness_m", "leaf_kg"),
-                *("stem_length_m", "branch_length_m", "leaf_length_m", "leaf_width_m"),
+                *("leaf_thickness_m", "leaf_kg", *lengths),
             ),
             ranges={
-                "num_stems": (0, MAX_STEMS),
-                "num_branches": (0, MAX_STEMS),
-                "leaves_per_stem": (0, MAX_LEAVES),
+                "num_stems": (0, _MAX_STEMS),
+                "num_branches": (0, _MAX_STEMS),
+                "leaves_per_stem": (0, _MAX_LEAVES),
                 "num_partly_covered": (0, self.rows * self.columns - self.num_blocked - 1),
                 "covered_share": (0.0, 1.0),
                 "hanging_share": (0.0, 1.0),
                 "max_slant_deg": (0.0, 45.0),
             },
-            intervals=(
-                *("stem_length_m", "branch_length_m", "leaf_length_m", "leaf_width_m"),
-                "covered_share",
-            ),
+            intervals=(*lengths, "covered_share"),
             vectors={"lower": 3, "upper": 3},
             ascending=[("lower", "upper")],
         )
@@ -96,42 +96,29 @@ class FoliageApertureClutter(ApertureBoard):
             raise ScenarioError(f"margin_m {self.margin_m} must be below half of the box's width")
         longest = max(self.stem_length_m[1], self.branch_length_m[1])
         if longest > height:
-            raise ScenarioError(
-                f"stems of {longest} m are longer than the box is high, {height:.3f} m"
-            )
+            raise ScenarioError(f"stems of {longest} m are longer than the box, {height:.3f} m")
 
     def sample(self, rng: np.random.Generator) -> ClutterInstance:
-        """Samples the foliage, and then the covers, on which the foliage does not depend.
-
-        The apertures of the instance are those without a cover.
-
-        Raises:
-            ScenarioError: The stems do not fit into the box.
-        """
+        """Samples the foliage, and then the covers, on which the foliage does not depend."""
         stems = self._grow(rng)
         p_WA = self.aperture_centres()
         order = rng.permutation(len(p_WA))
-        shares = _draw(rng, self.covered_share, len(p_WA))
+        shares = rng.uniform(*self.covered_share, size=len(p_WA))
         hangs = rng.random(len(p_WA)) < 0.5
         shares[order[: self.num_blocked]] = 1.0
         covered = np.sort(order[: self.num_blocked + self.num_partly_covered])
-        return join(
-            self.bare_board("wood"),
-            *self._supports(),
-            self._covers(p_WA[covered], shares[covered], hangs[: len(covered)]),
-            p_WA=np.delete(p_WA, covered, axis=0),
-            stems=stems,
-        )
-
-    def _supports(self) -> tuple[ClutterInstance, ClutterInstance]:
-        """Returns the trough below and the beam above."""
+        # The trough below and the beam above.
         low, high, up = np.array(self.lower), np.array(self.upper), np.eye(3)[2]
         middle, edges = 0.5 * (low + high), high - low
         trough, beam = edges.copy(), edges.copy()
         trough[2], beam[2] = self.trough_m, self.bar_m
-        return (
+        return join(
+            self.bare_board("wood"),
             make_objects("box", trough, middle - 0.5 * (edges + trough) * up, material="clay"),
             make_objects("box", beam, middle + 0.5 * (edges + beam) * up, material="wood"),
+            self._covers(p_WA[covered], shares[covered], hangs[: len(covered)]),
+            p_WA=np.delete(p_WA, covered, axis=0),
+            stems=stems,
         )
 
     def _covers(self, p_WA: Vector, shares: Vector, hangs: BoolVector) -> ClutterInstance:
@@ -150,16 +137,13 @@ class FoliageApertureClutter(ApertureBoard):
         low, high = np.array(self.lower) + self.margin_m, np.array(self.upper) - self.margin_m
         roots = place_discs(rng, m, low[:2], high[:2], self.root_distance_m)
         hangs = rng.random(m) < self.hanging_share
-        of_branch = _draw(rng, self.branch_length_m, m)
-        length = np.where(fixed, of_branch, _draw(rng, self.stem_length_m, m))
+        of_branch = rng.uniform(*self.branch_length_m, size=m)
+        length = np.where(fixed, of_branch, rng.uniform(*self.stem_length_m, size=m))
         p_WH = np.column_stack([roots, np.where(hangs, self.upper[2], self.lower[2])])
         slants = [self._slant(rng, *row) for row in zip(p_WH, length, hangs, strict=True)]
         R_WS = np.array(slants).reshape(-1, 3, 3)
-        leaves = [
-            self._leaf(rng, *stem)
-            for stem in zip(p_WH, R_WS, length, strict=True)
-            for _ in range(self.leaves_per_stem)
-        ]
+        owner = np.repeat(np.arange(m), self.leaves_per_stem)
+        leaves = [self._leaf(rng, p_WH[i], R_WS[i], length[i]) for i in owner]
         # The tip stiffness of a cantilever of this rigidity: L^2 / k = L^3 / (3 EI).
         stiffness = 3.0 * self.rigidity_N_m2 / length
         mass = self.stem_kg_per_m * length + self.leaf_kg * self.leaves_per_stem
@@ -172,7 +156,7 @@ class FoliageApertureClutter(ApertureBoard):
             mass=mass,
             stiffness=np.where(fixed, np.inf, stiffness),
             damping=np.where(fixed, 0.0, damping),
-            leaf_stem=np.repeat(np.arange(m), self.leaves_per_stem),
+            leaf_stem=owner,
             p_SL=np.array([leaf[0] for leaf in leaves]).reshape(-1, 3),
             R_SL=np.array([leaf[1] for leaf in leaves]).reshape(-1, 3, 3),
             leaf_size=np.array([leaf[2] for leaf in leaves]).reshape(-1, 3),
@@ -197,7 +181,7 @@ class FoliageApertureClutter(ApertureBoard):
         """Samples p_SL, R_SL and size of a leaf in the box."""
         signs = np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, -1).T
         for _ in range(MAX_TRIES):
-            edges = [_draw(rng, ends, 1) for ends in (self.leaf_length_m, self.leaf_width_m)]
+            edges = [rng.uniform(*ends, size=1) for ends in (self.leaf_length_m, self.leaf_width_m)]
             size = np.append(edges, self.leaf_thickness_m)
             along = length * rng.uniform(0.1, 1.0)
             # Outwards and up the stem, 10 to 60 degrees from perpendicular, and twisted.
@@ -216,12 +200,7 @@ class FoliageApertureClutter(ApertureBoard):
     def _holds(self, p_WQ: Vector, margin: float = 0.0) -> bool:
         """Returns whether all points lie in the box, at least `margin` from its sides."""
         inset = np.array([margin, margin, 0.0])
-        low, high = np.array(self.lower) + inset, np.array(self.upper) - inset
-        return bool(np.all(p_WQ >= low) and np.all(p_WQ <= high))
-
-
-def _draw(rng: np.random.Generator, ends: list[float], n: int) -> Vector:
-    return rng.uniform(ends[0], ends[1], n)
+        return bool(np.all((p_WQ >= self.lower + inset) & (p_WQ <= self.upper - inset)))
 
 
 def _rotation(azimuth: float, tilt: float) -> Vector:

@@ -6,10 +6,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lic_drake.errors import ScenarioError
 from lic_drake.types import BoolVector, IntVector, Vector, check_shapes
 
 SHAPES = ("cylinder", "box", "sphere")
 """Shape names: an upright cylinder (radius, length), a box (full edges), a sphere (radius)."""
+MAX_TRIES = 10_000
+"""Attempts per disc before the rectangle counts as full."""
 _ARRAYS = ("size", "p_WO", "yaw", "mass", "movable")
 _NAMES = ("shape", "material")
 
@@ -24,12 +27,9 @@ class Stems:
     Attributes:
         p_WH: Roots, shape (m, 3), metres.
         R_WS: Orientations at rest, shape (m, 3, 3).
-        length: Shape (m,), metres.
-        radius: Shape (m,), metres.
         mass: Of each stem with its leaves, shape (m,), kg.
-        stiffness: Of each hinge about any axis across the stem, shape (m,), Nm/rad; infinite for a
-            fixed branch.
-        damping: Of each hinge, shape (m,), Nms/rad.
+        stiffness: Of each hinge about any axis across the stem, Nm/rad; inf for a fixed branch.
+        damping: Of each hinge, Nms/rad.
         leaf_stem: Index of each leaf's stem, shape (k,).
         p_SL: Centres of the leaves in S, shape (k, 3), metres.
         R_SL: Their orientations, shape (k, 3, 3); Lx along the leaf, Lz across it.
@@ -50,8 +50,8 @@ class Stems:
 
     def __post_init__(self) -> None:
         m, k = len(self.p_WH), len(self.leaf_stem)
-        check_shapes(self, p_WH=(m, 3), R_WS=(m, 3, 3), length=(m,), radius=(m,), mass=(m,))
-        check_shapes(self, stiffness=(m,), damping=(m,))
+        numbers = dict.fromkeys(("length", "radius", "mass", "stiffness", "damping"), (m,))
+        check_shapes(self, p_WH=(m, 3), R_WS=(m, 3, 3), **numbers)
         check_shapes(self, p_SL=(k, 3), R_SL=(k, 3, 3), leaf_size=(k, 3))
         if k and not (0 <= self.leaf_stem.min() and self.leaf_stem.max() < m):
             raise ValueError(f"leaf_stem must be from 0 to {m - 1}")
@@ -84,16 +84,14 @@ class ClutterInstance:
 
     Attributes:
         shape: n names in `SHAPES`.
-        size: Shape (n, 3), metres: cylinder (radius, length, 0), box (x, y, z edges), sphere
-            (radius, 0, 0).
+        size: Shape (n, 3): the dimensions in `SHAPES`, then zeros.
         p_WO: Centres, shape (n, 3), metres.
         yaw: Rotations about Wz, shape (n,), radians.
         mass: Shape (n,), kg; ignored for fixed objects.
-        movable: Shape (n,), False for fixed objects.
+        movable: Shape (n,).
         material: Of each object, for its colour; may be empty.
         p_WG: The environment's goal, shape (3,), metres; None if goals are sampled elsewhere.
         p_WA: Centres of the open apertures, shape (k, 3), metres; None without a barrier.
-        stems: Elastic stems with leaves; None if there are none.
     """
 
     shape: tuple[str, ...]
@@ -128,13 +126,8 @@ class ClutterInstance:
     def translated(self, offset: Vector) -> "ClutterInstance":
         """Returns the environment translated by an offset, shape (3,), metres."""
         stems = self.stems and replace(self.stems, p_WH=self.stems.p_WH + offset)
-        return replace(
-            self,
-            p_WO=self.p_WO + offset,
-            p_WG=None if self.p_WG is None else self.p_WG + offset,
-            p_WA=None if self.p_WA is None else self.p_WA + offset,
-            stems=stems,
-        )
+        p_WG, p_WA = (p if p is None else p + offset for p in (self.p_WG, self.p_WA))
+        return replace(self, p_WO=self.p_WO + offset, p_WG=p_WG, p_WA=p_WA, stems=stems)
 
     def subset(self, indices: IntVector) -> "ClutterInstance":
         """Returns the environment with the objects at these indices, which may repeat."""
@@ -143,11 +136,8 @@ class ClutterInstance:
         return replace(self, **columns)
 
     def with_objects_at(self, p_WO: Vector) -> "ClutterInstance":
-        """Returns the environment with its movable objects at p_WO, shape (k, num_axes), metres.
-
-        Stems are unchanged: they spring back when released.
-        """
-        if self.stems is not None:
+        """Returns the environment with its movable objects at p_WO, shape (k, num_axes)."""
+        if self.stems is not None:  # They spring back when released.
             return self
         moved = self.p_WO.copy()
         moved[self.movable, : self.num_axes] = p_WO
@@ -166,14 +156,8 @@ def make_objects(
 ) -> ClutterInstance:
     """Returns n objects of one shape; see `ClutterInstance`.
 
-    Args:
-        shape: One of `SHAPES`.
-        size: The shape's dimensions, for all or for each object, metres.
-        p_WO: Centres, shape (n, 3), or (n, 2) for z = 0, metres.
-        yaw: Shape (n,) or a number, radians.
-        mass: Shape (n,) or a number, kg.
-        movable: Shape (n,) or one bool.
-        material: Material of all of them.
+    Centres have shape (n, 3), or (n, 2) for z = 0. The shape's dimensions, yaw, mass and movable
+    are those of all objects or of each.
     """
     p_WO = np.atleast_2d(np.asarray(p_WO, dtype=float))
     n = len(p_WO)
@@ -208,3 +192,28 @@ def _pad(rows: Vector, n: int) -> Vector:
     padded = np.zeros((n, 3))
     padded[:, : rows.shape[1]] = rows
     return padded
+
+
+def place_discs(
+    rng: np.random.Generator, count: int, lower: ArrayLike, upper: ArrayLike, min_distance: float
+) -> Vector:
+    """Samples uniform centres, shape (count, d), metres, rejecting those too close to earlier ones.
+
+    The rule of the authors' generator (gt-ros-pkg/hrl-haptic-manip, obstacles.py), which ignores
+    goals. Discs, or balls, that do not fit between the corners are a ScenarioError.
+    """
+    lower, upper = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
+    centres = np.empty((count, len(lower)))
+    for i in range(count):
+        for _ in range(MAX_TRIES):
+            candidate = rng.uniform(lower, upper)
+            if np.all(np.sum((centres[:i] - candidate) ** 2, axis=1) >= min_distance**2):
+                centres[i] = candidate
+                break
+        else:
+            size = np.prod(upper - lower)
+            raise ScenarioError(
+                f"only {i} of {count} objects fit into {size:.3g} m^{len(lower)} at a distance of"
+                f" {min_distance:.3g} m; use fewer or smaller objects or a larger region"
+            )
+    return centres

@@ -16,8 +16,7 @@ class PassageClutter:
     `models/scenarios/passage-clutter.yaml` says how those were chosen.
     """
 
-    # Clear distance between the walls, and their length and width, metres (paper IV-A); their
-    # height from the authors' simulator.
+    # Metres, from the paper (IV-A); the height from the authors' simulator.
     gap_m: float = 0.1
     wall_length_m: float = 0.4
     wall_width_m: float = 0.02
@@ -46,10 +45,6 @@ class PassageClutter:
         slope = np.deg2rad(rng.uniform(self.min_slope_deg, self.max_slope_deg))
         # From the centre to the centre line of the wall on the left.
         to_wall = 0.5 * (self.gap_m + self.wall_width_m) * np.array([-np.sin(slope), np.cos(slope)])
-        walls = make_objects(
-            "box",
-            [self.wall_length_m, self.wall_width_m, self.wall_height_m],
-            [centre + to_wall, centre - to_wall],
-            yaw=slope,
-        )
+        edges = [self.wall_length_m, self.wall_width_m, self.wall_height_m]
+        walls = make_objects("box", edges, [centre + to_wall, centre - to_wall], yaw=slope)
         return replace(walls, p_WG=np.append(centre, 0.0))

@@ -19,7 +19,6 @@ class ClutterSampler(Protocol):
 
     def sample(self, rng: np.random.Generator) -> ClutterInstance:
         """Samples one environment."""
-        ...
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -30,8 +29,7 @@ class Category:
         sampler: The dataclass of its parameters.
         in_space: Whether hands and goals are in space, else in the plane.
         observed: LIC-2's features of the first reach, the paper's o: columns of
-            `lic_drake.experience.pairs`. None: no LIC-2; further starts are LIC-1's best away from
-            the failed ones.
+            `lic_drake.experience.pairs`. None: no LIC-2.
     """
 
     sampler: type[ClutterSampler]
@@ -52,27 +50,16 @@ def register_category(
     in_space: bool = False,
     observed: tuple[str, ...] | None = _FIRST_START,
 ) -> None:
-    """Registers a category.
+    """Registers a category, by its name in scenario files; see `Category`.
 
-    Args:
-        name: Its name in scenario files.
-        sampler: A dataclass of its parameters, each with a type (not a string: Drake's YAML reader
-            needs the type itself) and a default, with a method `sample(rng)`.
-        in_space: See `Category`.
-        observed: See `Category`; by default the start of the first reach.
-
-    Raises:
-        ScenarioError: The name is taken, or the class is not such a dataclass.
+    The sampler is a dataclass of parameters, each with a default and a type (not a string: Drake's
+    YAML reader needs the type itself), with a method `sample(rng)`; else it is a ScenarioError.
     """
-    if not isinstance(sampler, type) or not dataclasses.is_dataclass(sampler):
+    can_sample = callable(getattr(sampler, "sample", None))
+    if not isinstance(sampler, type) or not dataclasses.is_dataclass(sampler) or not can_sample:
         raise ScenarioError(
             f"the sampler of category {name!r} must be a class decorated with"
-            f" @dataclass(kw_only=True), got {sampler!r}"
-        )
-    if not callable(getattr(sampler, "sample", None)):
-        raise ScenarioError(
-            f"the sampler of category {name!r} has no method sample(rng) that returns a"
-            " ClutterInstance; add one"
+            f" @dataclass(kw_only=True) and have a method sample(rng), got {sampler!r}"
         )
     for item in dataclasses.fields(sampler):
         if item.default is item.default_factory is dataclasses.MISSING:
@@ -87,11 +74,7 @@ def register_category(
 
 
 def get_category(name: str) -> Category:
-    """Returns the category with this name.
-
-    Raises:
-        ScenarioError: The category is unknown.
-    """
+    """Returns the category with this name; a ScenarioError if it is unknown."""
     return _CATEGORIES.get(name)
 
 
@@ -100,19 +83,11 @@ def category_names() -> tuple[str, ...]:
     return _CATEGORIES.names()
 
 
-register_category(
-    "cylinder-clutter",
-    CylinderClutter,
-    observed=(*_FIRST_START, "first_final_x", "first_final_y"),
-)
-register_category(
-    "passage-clutter",
-    PassageClutter,
-    observed=(*_FIRST_START, "first_final_vx", "first_final_vy"),
-)
+_AT_REST, _MOVING = ("first_final_x", "first_final_y"), ("first_final_vx", "first_final_vy")
+register_category("cylinder-clutter", CylinderClutter, observed=_FIRST_START + _AT_REST)
+register_category("passage-clutter", PassageClutter, observed=_FIRST_START + _MOVING)
 register_category("cylinder-aperture-clutter", CylinderApertureClutter)
-# Behind a board a failure carries little information: LIC-1 away from the failed start succeeded in
-# 20 of 297 second attempts (K-NN 28 of 312), LIC-2 from local rows in 6 (22)
-# (notebooks/results/ablation/space_features.md).
+# Behind a board a failure says little: LIC-1 away from it succeeded in 20 of 297 second attempts,
+# LIC-2 from local rows in 6 (notebooks/results/ablation/space_features.md).
 register_category("sphere-aperture-clutter", SphereApertureClutter, in_space=True, observed=None)
 register_category("foliage-aperture-clutter", FoliageApertureClutter, in_space=True, observed=None)

@@ -9,23 +9,12 @@ from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import ScenarioError
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.start import Starts
-from lic_drake.starts.board import BoardStarts
-from lic_drake.starts.feasible import FeasibleStarts
-from lic_drake.starts.line import LineStarts
-from lic_drake.starts.region import Region, find_regions
+from lic_drake.starts.board import BoardStarts as BoardStarts
+from lic_drake.starts.feasible import FeasibleStarts as FeasibleStarts
+from lic_drake.starts.feasible import Region as Region
+from lic_drake.starts.feasible import find_regions as find_regions
+from lic_drake.starts.line import LineStarts as LineStarts
 from lic_drake.types import Vector
-
-__all__ = [
-    "BoardStarts",
-    "FeasibleStarts",
-    "LineStarts",
-    "Region",
-    "board_starts",
-    "find_regions",
-    "line_starts",
-    "make_starts",
-    "training_starts",
-]
 
 
 def make_starts(
@@ -33,14 +22,8 @@ def make_starts(
 ) -> LineStarts | BoardStarts:
     """Returns the initial conditions that are feasible in an environment of a scenario.
 
-    Args:
-        scenario: The scenario.
-        instance: The environment.
-        moves: Whether base and torso before a board may move as the task allows; without, they
-            stay where they are.
-
-    Raises:
-        ScenarioError: The arm moves in space and there is no board of apertures.
+    Base and torso before a board may move as the task allows, or stay where they are. An arm in
+    space without a board of apertures is a ScenarioError.
     """
     if scenario.arm().is_planar:
         return line_starts(scenario, instance)
@@ -60,14 +43,8 @@ def board_starts(
 ) -> BoardStarts:
     """Returns the starts of an arm in space at the open apertures of an environment.
 
-    Args:
-        scenario: The scenario.
-        instance: The environment.
-        moves: Whether base and torso may move as the task allows.
-        b0: Where they are otherwise, shape (3,), metres; by default as the task has it.
-
-    Raises:
-        ScenarioError: The arm is one of the plane, or the environment has no board of apertures.
+    Base and torso may move as the task allows, or are at b0, by default as the task has it. An arm
+    in the plane, or an environment without a board, is a ScenarioError.
     """
     board = isinstance(scenario.clutter, ApertureBoard) and instance.p_WA is not None
     if scenario.arm().is_planar or not board:

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,21 +17,15 @@ from lic_drake.reach.start import Start, Starts
 from lic_drake.robots.arm import Arm
 from lic_drake.scene.collision import CollisionChecker
 from lic_drake.scene.scene import SceneConfig
-from lic_drake.starts.feasible import Effort, FeasibleStarts
-from lic_drake.starts.region import TOLERANCE, Region
+from lic_drake.starts.feasible import TOLERANCE, Effort, FeasibleStarts, Region
 from lic_drake.types import Vector
 
 GRID_M = (0.1, 0.05)
 """Distances of neighbouring bases and of heights of the torso in the grid, metres."""
-
 LATTICE_M = 0.025
 """Largest distance of neighbouring bases and heights of the torso in the lattice, metres."""
-
-INTO_CLUTTER = np.array([1.0, 0.0, 0.0])
-"""The way from the robot into the clutter, along which the hand points."""
-
-_DECIMALS = 6
-"""To the micrometre, as places are chosen: what is equal but for rounding is one place."""
+# The way from the robot into the clutter, along which the hand points.
+_INTO_CLUTTER = np.array([1.0, 0.0, 0.0])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -44,9 +39,8 @@ class BoardStarts(FeasibleStarts):
         scenario: The scenario, with an arm in space and a board of apertures.
         instance: The environment.
         b0_lower: Lower bounds of base and torso, shape (3,), metres; x is fixed.
-        b0_upper: Their upper bounds, shape (3,), metres.
-        probability_open: How likely each open aperture really is open, shape (k,); None where that
-            is certain.
+        b0_upper: Their upper bounds.
+        probability_open: How likely each open aperture really is open, shape (k,), if uncertain.
     """
 
     scenario: Scenario
@@ -103,7 +97,9 @@ class BoardStarts(FeasibleStarts):
         """All open apertures, from bases and heights of the torso in equal steps."""
         y, torso = (self._steps(axis, GRID_M[axis - 1]).tolist() for axis in (1, 2))
         b0 = tuple((float(self.b0_lower[0]), *place) for place in product(y, torso))
-        found = _preferred_before_bare_board(self.arm, _numbers(self.board), b0)
+        board = self.board
+        key = (tuple(board.board_centre), board.columns, board.rows, board.aperture_m, board.bar_m)
+        found = _preferred_before_bare_board(self.arm, key, b0)
         if len(self.p_WA) == len(self.board.aperture_centres()):
             return found
         assert found.q is not None
@@ -138,7 +134,7 @@ class BoardStarts(FeasibleStarts):
         return found
 
     def solve(self, x0: Vector, b0: Vector, near: Vector | None = None) -> Vector | None:
-        """Returns joint angles for a hand pose from a base, else None; see `FeasibleStarts`."""
+        """See `FeasibleStarts.solve`."""
         if not any(region.holds(x0, b0) for region in self.regions):
             return None
         x0_R = Start(x0, b0).x0_R
@@ -164,11 +160,7 @@ class BoardStarts(FeasibleStarts):
         return replace(self, b0_lower=b0, b0_upper=b0).grid.without_q()
 
     def nearest_aperture(self, y_m: float, z_m: float) -> Vector:
-        """Returns the centre of the open aperture at a place in the board, shape (3,), metres.
-
-        Raises:
-            RequestError: There is none.
-        """
+        """Returns the centre of the open aperture at a place in the board; RequestError if none."""
         distance = np.linalg.norm(self.p_WA[:, 1:] - [y_m, z_m], axis=1)
         p_WA: Vector = self.p_WA[np.argmin(distance)]
         if not distance.min() <= 0.5 * self.board.aperture_m:
@@ -184,27 +176,22 @@ class BoardStarts(FeasibleStarts):
         count = int(np.ceil((high - low) / step_m - 1e-9)) + 1
         more = np.ravel(more)
         inside = more[(more > low) & (more < high)]
-        return np.unique(np.round(np.append(np.linspace(low, high, count), inside), _DECIMALS))
-
-
-_Numbers = tuple[tuple[str, object], ...]
-
-
-def _numbers(board: ApertureBoard) -> _Numbers:
-    names = ("columns", "rows", "aperture_m", "bar_m")
-    centre = ("board_centre", tuple(board.board_centre))
-    return (centre, *((name, getattr(board, name)) for name in names))
+        # What is equal but for rounding is one place.
+        return np.unique(np.round(np.append(np.linspace(low, high, count), inside), 6))
 
 
 @lru_cache(maxsize=64)
 def _preferred_before_bare_board(
-    arm: Arm, board: _Numbers, b0: tuple[tuple[float, ...], ...]
+    arm: Arm, board: tuple[Any, ...], b0: tuple[tuple[float, ...], ...]
 ) -> Starts:
     """Returns what Eq. (5) prefers in each aperture from each base, where there is anything.
 
     All environments of a scenario have the same board, but for what is blocked.
     """
-    bare = ApertureBoard(**dict(board)).bare_board()  # type: ignore[arg-type]
+    centre, columns, rows, aperture_m, bar_m = board
+    bare = ApertureBoard(
+        board_centre=list(centre), columns=columns, rows=rows, aperture_m=aperture_m, bar_m=bar_m
+    ).bare_board()
     assert bare.p_WA is not None
     checker = CollisionChecker(arm, bare, SceneConfig())
     found = [
@@ -222,7 +209,7 @@ def _preferred(
     arm: Arm, checker: CollisionChecker, p_WA: Vector, b0: Vector
 ) -> Iterator[Start | None]:
     """Yields what Eq. (5) prefers in each of k apertures, shape (k, 3), from a base."""
-    for p_WE, angles in zip(p_WA, arm.solve_pointing(p_WA - b0, INTO_CLUTTER), strict=True):
+    for p_WE, angles in zip(p_WA, arm.solve_pointing(p_WA - b0, _INTO_CLUTTER), strict=True):
         q = checker.first_free(b0, angles)
         # Exactly the centre; of the pose only the roll is left to the arm.
         yield None if q is None else Start(np.append(p_WE, arm.tip_pose(q)[3:]), b0, q)

@@ -10,8 +10,7 @@ from lic_drake.reach.start import Starts
 from lic_drake.reach.task import BaseTrack, StartLine
 from lic_drake.robots.arm import Arm
 from lic_drake.seeds import make_generator
-from lic_drake.starts.feasible import FeasibleStarts
-from lic_drake.starts.region import TOLERANCE, Region
+from lic_drake.starts.feasible import TOLERANCE, FeasibleStarts, Region
 from lic_drake.types import Vector
 
 LATTICE_SHAPE = (33, 25)
@@ -25,12 +24,6 @@ class LineStarts(FeasibleStarts):
     With phi within +-90 degrees the whole last link is behind the line, in the open space outside
     the clutter. A fixed base has the line in W. A base on a track brings the line to the apertures:
     the hand starts in the centre of one, and where it may be relative to the base, says the line.
-
-    Attributes:
-        robot: The arm.
-        line: The hand poses in R.
-        track: Where the base may stand; None: at the origin.
-        p_WA: Centres of the apertures, shape (k, 3), metres; None without a track.
     """
 
     robot: Arm
@@ -48,9 +41,8 @@ class LineStarts(FeasibleStarts):
         """The line, or one an aperture, where orientation and base are free."""
         line, track = self.line, self.track
         if track is None or self.p_WA is None:
-            zeros = np.zeros(3)
-            region = Region(lower=line.lower, upper=line.upper, b0_lower=zeros, b0_upper=zeros)
-            return (region,)
+            still = np.zeros(3)
+            return (Region(lower=line.lower, upper=line.upper, b0_lower=still, b0_upper=still),)
         return tuple(
             Region(
                 lower=np.array([x, y, line.lower[2]]),
@@ -64,14 +56,18 @@ class LineStarts(FeasibleStarts):
     @cached_property
     def grid(self) -> Starts:
         """The poses of the line's grid, at every aperture from which the track allows them."""
-        return self._placed(_possible(self.robot, _numbers(self.line)))
+        return self._placed(_possible(self.robot, tuple(asdict(self.line).items()), False))
 
     def lattice(self, values: Vector) -> Starts:
         """Returns all possible poses of a lattice over the line, at every aperture."""
         return self._lattice
 
+    @cached_property
+    def _lattice(self) -> Starts:
+        return self._placed(_possible(self.robot, tuple(asdict(self.line).items()), True))
+
     def solve(self, x0: Vector, b0: Vector, near: Vector | None = None) -> Vector | None:
-        """Returns the joint angles for a hand pose from a base, else None; see `FeasibleStarts`."""
+        """See `FeasibleStarts.solve`."""
         x0_R = x0 - [b0[0], b0[1], 0.0]
         low, high = self.line.lower - TOLERANCE, self.line.upper + TOLERANCE
         inside = any(region.holds(x0, b0) for region in self.regions)
@@ -91,19 +87,15 @@ class LineStarts(FeasibleStarts):
         return self.draw(rng, self.track.starts_per_aperture)
 
     def draw(self, rng: np.random.Generator, per_region: int) -> Starts:
-        """Draws uniformly among all, the same number in each region.
-
-        Raises:
-            RequestError: The arm reaches an aperture from nowhere on the track.
-        """
+        """Draws uniformly among all, the same number in each region; a RequestError if none is."""
         found = [self._draw_one(rng, region) for region in self.regions for _ in range(per_region)]
         x0, b0 = zip(*found, strict=True)
         return Starts(np.array(x0), np.array(b0))
 
     def _draw_one(self, rng: np.random.Generator, region: Region) -> tuple[Vector, Vector]:
+        high = np.maximum(region.b0_lower, region.b0_upper)[:2]
         for _ in range(10_000):
             x0 = rng.uniform(region.lower, region.upper)
-            high = np.maximum(region.b0_lower, region.b0_upper)[:2]
             b0 = np.append(rng.uniform(region.b0_lower[:2], high), 0.0)
             if self.solve(x0, b0) is not None:
                 return x0, b0
@@ -111,10 +103,6 @@ class LineStarts(FeasibleStarts):
             f"the arm reaches the aperture at y = {region.lower[1]:.3f} m from nowhere on its"
             " track; widen task.base or the orientations of task.start_line"
         )
-
-    @cached_property
-    def _lattice(self) -> Starts:
-        return self._placed(_dense(self.robot, _numbers(self.line)))
 
     def _placed(self, poses: Starts) -> Starts:
         """Returns poses in R as starts, at each aperture if there are any."""
@@ -138,23 +126,11 @@ def scan(arm: Arm, line: StartLine, num_y: int, num_phi: int) -> Starts:
     return _solved(arm, np.array([[line.x_m, yi, phi_i] for yi in y for phi_i in phi]))
 
 
-_Line = tuple[tuple[str, float], ...]
-
-
-def _numbers(line: StartLine) -> _Line:
-    return tuple(asdict(line).items())
-
-
-@lru_cache(maxsize=16)
-def _possible(arm: Arm, line: _Line) -> Starts:
-    """Returns the grid poses of a start line that an arm can take, in R."""
-    return _solved(arm, StartLine(**dict(line)).grid(arm))
-
-
-@lru_cache(maxsize=16)
-def _dense(arm: Arm, line: _Line) -> Starts:
-    """Returns the poses of a lattice over a start line that an arm can take, in R."""
-    return scan(arm, StartLine(**dict(line)), *LATTICE_SHAPE)
+@lru_cache(maxsize=32)
+def _possible(arm: Arm, line: tuple[tuple[str, float], ...], dense: bool) -> Starts:
+    """Returns the poses of a start line's grid or lattice that an arm can take, in R."""
+    start_line = StartLine(**dict(line))
+    return scan(arm, start_line, *LATTICE_SHAPE) if dense else _solved(arm, start_line.grid(arm))
 
 
 def _solved(arm: Arm, poses: Vector) -> Starts:

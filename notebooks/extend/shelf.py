@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lic_drake import register_category
-from lic_drake.clutter.instance import ClutterInstance, join, make_objects
-from lic_drake.clutter.placement import place_discs
+from lic_drake.clutter.instance import ClutterInstance, join, make_objects, place_discs
 from lic_drake.config import check_numbers
 
 

@@ -9,8 +9,7 @@ from scipy.stats import kstest
 from support.worlds import corners
 
 from lic_drake.clutter.cylinder import CylinderApertureClutter, CylinderClutter
-from lic_drake.clutter.instance import ClutterInstance
-from lic_drake.clutter.placement import place_discs
+from lic_drake.clutter.instance import ClutterInstance, place_discs
 from lic_drake.errors import ScenarioError
 from lic_drake.seeds import make_generator
 

@@ -10,8 +10,7 @@ from pydrake.systems.framework import DiagramBuilder
 from scipy.sparse.csgraph import shortest_path
 from support.worlds import ARM, box, cylinder, make_clutter, make_world
 
-from lic_drake.clutter.instance import ClutterInstance
-from lic_drake.clutter.placement import place_discs
+from lic_drake.clutter.instance import ClutterInstance, place_discs
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.sleeping import (
     GROUP_M,
