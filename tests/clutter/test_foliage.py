@@ -71,14 +71,10 @@ def test_stems_are_rooted_below_or_hang_from_above_and_slant_a_little() -> None:
     assert 8 <= np.count_nonzero(hangs) <= 30  # 18.4 of 46 expected, standard deviation 3.3.
     up = np.where(hangs, -1.0, 1.0) * stems.R_WS[:, 2, 2]
     assert np.all(up >= np.cos(np.deg2rad(SHIPPED.max_slant_deg)) - 1e-12)
-
-
-def test_leaves_begin_on_their_stem() -> None:
-    stems = stems_of(sample(SHIPPED))
+    # Leaves begin on their stem.
     begin = stems.p_SL - 0.5 * stems.leaf_size[:, :1] * stems.R_SL[:, :, 0]
     np.testing.assert_allclose(begin[:, :2], 0.0, atol=1e-12)
-    assert np.all(begin[:, 2] > 0.0)
-    assert np.all(begin[:, 2] <= stems.length[stems.leaf_stem])
+    assert np.all((begin[:, 2] > 0.0) & (begin[:, 2] <= stems.length[stems.leaf_stem]))
 
 
 def test_a_stem_gives_way_at_its_tip_as_a_cantilever_of_its_wire() -> None:

@@ -1,5 +1,3 @@
-from typing import Any
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -85,15 +83,5 @@ def test_centres_and_slopes_are_uniform_and_independent() -> None:
     assert kstest((y - passage.centre_from[1]) / 0.4, "uniform").pvalue > 1e-3
     assert kstest((slope - passage.min_slope_deg) / slopes, "uniform").pvalue > 1e-3
     assert abs(np.corrcoef(y, slope)[0, 1]) < 0.09  # 4 standard deviations
-
-
-@pytest.mark.parametrize(
-    ("values", "message"),
-    [
-        ({"min_slope_deg": 40.0}, "min_slope_deg must not exceed max_slope_deg, got 40.0 and 35.0"),
-        ({"max_slope_deg": 91.0}, "max_slope_deg must be from -90 to 90, got 91.0"),
-    ],
-)
-def test_a_value_that_cannot_be_used_is_named(values: dict[str, Any], message: str) -> None:
-    with pytest.raises(ScenarioError, match=message):
-        PassageClutter(**values)
+    with pytest.raises(ScenarioError, match="min_slope_deg must not exceed max_slope_deg, got 40"):
+        PassageClutter(min_slope_deg=40.0)

@@ -3,32 +3,14 @@
 import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import Context
 from support.kinematics import link_origins
 from support.worlds import ARM, LAYOUT
 
-from lic_drake.control.mpc import PRESETS, HapticMpc, MpcConfig, MpcInput
+from lic_drake.control.mpc import PRESETS, HapticMpc, MpcInput
 from lic_drake.control.mpc_controller import HapticMpcController
 
 Q = np.deg2rad([-30.0, 60.0, 50.0])
 GOAL = np.array([0.5, -0.3, 0.0])
-
-
-def make_context(
-    config: MpcConfig, forces: np.ndarray, q_d: np.ndarray = Q
-) -> tuple[HapticMpcController, Context]:
-    controller = HapticMpcController(ARM, LAYOUT, config)
-    context = controller.CreateDefaultContext()
-    controller.GetInputPort("arm_state").FixValue(context, np.append(Q, np.zeros(3)))
-    controller.GetInputPort("taxel_force").FixValue(context, forces)
-    controller.GetInputPort("goal").FixValue(context, GOAL)
-    controller.set_equilibrium(context, q_d)
-    return controller, context
-
-
-def next_equilibrium(controller: HapticMpcController, context: Context) -> np.ndarray:
-    Simulator(controller, context).AdvanceTo(1e-6)
-    return controller.GetOutputPort("desired_state").Eval(context)
 
 
 @pytest.mark.parametrize("preset", ["haptic_mpc_2013", "ijrr_2013"])
@@ -38,7 +20,12 @@ def test_the_desired_state_is_one_mpc_step_on_with_no_velocity(preset: str) -> N
     forces[20] = PRESETS[preset]().force_trim_N  # Ignored.
     q_d = Q + np.array([0.02, -0.03, 0.01])
     config = PRESETS[preset]()
-    controller, context = make_context(config, forces, q_d)
+    controller = HapticMpcController(ARM, LAYOUT, config)
+    context = controller.CreateDefaultContext()
+    controller.GetInputPort("arm_state").FixValue(context, np.append(Q, np.zeros(3)))
+    controller.GetInputPort("taxel_force").FixValue(context, forces)
+    controller.GetInputPort("goal").FixValue(context, GOAL)
+    controller.set_equilibrium(context, q_d)
     # Taxels and Jacobians by Drake-free formulas of their own: planar geometry, link by link.
     contacts = []
     for taxel in (60, 140, 181):
@@ -62,6 +49,6 @@ def test_the_desired_state_is_one_mpc_step_on_with_no_velocity(preset: str) -> N
     )
     expected = q_d + HapticMpc(config, ARM.stiffness, ARM.q_min, ARM.q_max).step(state)
     assert np.linalg.norm(expected - q_d) > 1e-4
-    np.testing.assert_allclose(
-        next_equilibrium(controller, context), np.append(expected, np.zeros(3)), atol=1e-12
-    )
+    Simulator(controller, context).AdvanceTo(1e-6)
+    desired = controller.GetOutputPort("desired_state").Eval(context)
+    np.testing.assert_allclose(desired, np.append(expected, np.zeros(3)), atol=1e-12)

@@ -23,12 +23,6 @@ GOAL = np.array([0.6, 0.1, 0.0])
 HAND, GRIPPER = Hand.of(ARM), Hand.of(get_robot("pr2"))
 
 
-def test_hands_are_measured_in_the_models() -> None:
-    np.testing.assert_allclose(HAND, [0.288, 0.015], atol=1e-6)
-    assert GRIPPER.length_m == pytest.approx(0.18)
-    assert 0.04 < GRIPPER.radius_m < 0.06
-
-
 def failed(*starts: np.ndarray) -> tuple[FailedReach, ...]:
     return tuple(FailedReach.from_start(Start(x0)) for x0 in starts)
 

@@ -6,7 +6,6 @@ from support.pr2_reaches import SCENARIO
 from support.pr2_reference import link_poses
 
 from lic_drake.errors import RequestError, ScenarioError
-from lic_drake.reach.environment import Environment
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.starts import BoardStarts, board_starts, make_starts, training_starts
 
@@ -35,38 +34,15 @@ def assert_points_in(starts: BoardStarts, rows: np.ndarray) -> None:
         assert sum(region.holds(x0, b0) for region in starts.regions) == 1
 
 
-def test_a_robot_that_stays_has_a_start_in_the_centre_of_each_aperture() -> None:
+def test_there_are_starts_in_the_centre_of_each_aperture_from_everywhere_in_range() -> None:
     assert len(STILL.grid) == 20
     np.testing.assert_allclose(STILL.grid.x0[:, :3], INSTANCE.p_WA)
     np.testing.assert_array_equal(STILL.grid.b0, np.tile([0.0, 0.0, 0.15], (20, 1)))
-    assert_points_in(STILL, np.arange(20))
-
-
-def test_a_robot_that_moves_has_them_from_everywhere_in_its_range() -> None:
     assert 700 < len(STARTS.grid) <= 20 * 7 * 7
     low, high = STARTS.grid.b0.min(axis=0), STARTS.grid.b0.max(axis=0)
     np.testing.assert_allclose(low, [0.0, STAND.y_min_m, STAND.torso_min_m])
     np.testing.assert_allclose(high, [0.0, STAND.y_max_m, STAND.torso_max_m])
     assert_points_in(STARTS, np.arange(0, len(STARTS.grid), 40))
-
-
-def test_a_reach_without_joint_angles_begins_with_the_preferred_ones() -> None:
-    short = load_scenario("sphere-aperture-clutter", "{stop: {timeout_s: 0.04}}")
-    environment = Environment(short, INSTANCE, b0=STILL.grid.b0[0])
-    p_WG = SCENARIO.goals("training", 0)[4]
-    for start in STILL.grid.take(np.arange(0, 20, 4)):
-        result = environment.reach(p_WG, start.x0)
-        assert result.outcome == "timeout", result.detail
-        np.testing.assert_allclose(result.trace.q[0], start.q, atol=1e-6)
-        # Those that are prescribed are those that it begins with.
-        (other, *_) = (
-            q
-            for q in STILL.arm.solve_ik(start.x0_R)
-            if not np.allclose(q, start.q, atol=0.1) and not STILL.checker.touches(start.b0, q)
-        )
-        result = environment.reach(p_WG, start.x0, q=other)
-        if result.trace.q:
-            np.testing.assert_array_equal(result.trace.q[0], other)
 
 
 def test_no_other_configuration_without_contact_costs_less() -> None:
