@@ -109,9 +109,6 @@ def test_remarks_on_differences_state_their_tests() -> None:
         assert f"t({result.df}) = {result.t:.2f}, p = {p}" in text
 
 
-# With our numbers
-
-
 SMALL = TrialTable(
     make_rows("rnd", ["1", "01", "00", "00", "00", "00", "00", "00"])
     + make_rows("cost", ["00", "1", "1", "00", "00", "00", "00", "00"])
@@ -136,22 +133,10 @@ def test_the_papers_own_counts_give_its_tables(paper: PaperTable) -> None:
             assert (row[2], row[4]) == ("80.45 (1609/2000)", "81.35 (1627/2000)")
         else:
             assert row[2:4] == row[4:6]
-
-
-def test_rates_come_with_counts_and_wilson_intervals_in_the_papers_order() -> None:
-    table = success_table(TrialTable(paper_rows(TABLE_I, goals=10)), TABLE_I)
-    found = cells(table)
-    assert [key for key in found if key[0] == "1st attempt"] == [
-        ("1st attempt", name) for name in ("RND", "COST", "LIC(GP)", "LIC(K-NN)")
-    ]
-    first = found["1st attempt", "RND"]
-    assert first["ours, %"] == "61.00 (1220/2000)"
-    # The half width that the paper's Fig. 8 shows is 1.8 points.
-    assert first["90 % interval"] == "59.2..62.8"
-    assert found["2nd attempt", "LIC(GP)"]["ours, %"] == "29.95 (133/444)"
-    assert found["total", "LIC(GP)"]["ours, %"] == "84.45 (1689/2000)"
-    assert "ours on 2000 goals" in table.caption
-    assert "200 random environments" in table.caption
+    if paper is TABLE_I:  # The half width that the paper's Fig. 8 shows is 1.8 points.
+        assert rows[0][2:4] == ("61.00 (1220/2000)", "59.2..62.8")
+        assert "ours on 2000 goals" in table.caption
+        assert "200 random environments" in table.caption
 
 
 def test_strategies_are_paired_with_those_to_their_left() -> None:
@@ -192,5 +177,4 @@ def test_margins_of_the_papers_counts_are_the_papers() -> None:
         assert row["ours"] == row["paper"]
         low, high = map(float, re.findall(r"[+-][\d.]*\d", row["90 % interval"]))
         assert low < float(row["ours"]) < high
-    assert found["1st attempt", "LIC(GP) - RND"]["paper"] == "+16.80"
     assert found["total", "LIC(GP) - COST"]["paper"] == "+6.30"

@@ -5,21 +5,7 @@ import numpy as np
 import pytest
 
 from lic_drake.control.mpc import QuadraticProgram, solve
-from lic_drake.evaluate.speed import measure_reaches, split_time
-from lic_drake.reach.scenario import load_scenario
-
-
-def test_speed_counts_reaches_and_splits_all_of_their_time() -> None:
-    scenario = load_scenario(
-        "cylinder-clutter", "{clutter: {num_movable: 2, num_fixed: 2}, stop: {timeout_s: 0.4}}"
-    )
-    speed = measure_reaches(scenario, reaches=3, per_environment=2)
-    assert speed["reaches"] <= 3
-    assert speed["simulated_s"] == pytest.approx(0.4 * speed["reaches"])
-    assert speed["wall_per_sim_s"] > 0.0
-    assert set(speed["split"]) == {"physics", "sensor", "mpc", "build", "rest"}
-    assert sum(speed["split"].values()) == pytest.approx(1.0)
-    assert min(speed["split"]["physics"], speed["split"]["mpc"]) > 0.02
+from lic_drake.evaluate.speed import split_time
 
 
 def test_time_of_other_functions_is_that_of_the_parts_that_call_them() -> None:
@@ -28,4 +14,6 @@ def test_time_of_other_functions_is_that_of_the_parts_that_call_them() -> None:
     with cProfile.Profile() as profile:
         for _ in range(100):
             solve(problem)
-    assert split_time(pstats.Stats(profile))["mpc"] > 0.9
+    split = split_time(pstats.Stats(profile))
+    assert sum(split.values()) == pytest.approx(1.0)
+    assert split["mpc"] > 0.9

@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 from support.dask_cluster import dask_cluster
-from support.fake_reach import comparable, make_record, make_request
+from support.fake_reach import comparable, make_record
+from support.made_up import planar_library, small_cameras, sphere_library
 
 from lic_drake.errors import LibraryError, RequestError
 from lic_drake.evaluate import trial as dut
@@ -17,22 +18,6 @@ from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.scenario import load_scenario
 
 EASY = "{clutter: {num_movable: 2, num_fixed: 2}, stop: {timeout_s: 0.2}}"
-
-
-def make_library(
-    path: Path, category: str = "cylinder-clutter", overrides: str = EASY
-) -> ExperienceLibrary:
-    """A library in which exactly the starts left of the middle succeed."""
-    scenario = load_scenario(category, overrides)
-    library = ExperienceLibrary(path)
-    request = make_request(scenario=scenario, max_goals=6, max_starts=9)
-    for environment in range(3):
-        records = [
-            replace(make_record(r), success=r.start.x0[1] > 0.0)
-            for r in request.reaches(environment)
-        ]
-        library.write_shard(f"training-{environment}", records, scenario)
-    return library
 
 
 @pytest.fixture
@@ -50,23 +35,14 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 def evaluation(tmp_path: Path, **values: Any) -> Evaluation:
     if not (tmp_path / "library").exists():
-        make_library(tmp_path / "library")
-    defaults: dict[str, Any] = {
-        "experience": tmp_path / "library",
-        "results": tmp_path / "out",
-        "methods": ("rnd", "gp1"),
-        "environments": 3,
-        "goals": 2,
-    }
-    return Evaluation(**{**defaults, **values})
+        planar_library(tmp_path / "library", load_scenario("cylinder-clutter", EASY))
+    paths = {"experience": tmp_path / "library", "results": tmp_path / "out"}
+    defaults = {"methods": ("rnd", "gp1"), "environments": 3, "goals": 2}
+    return Evaluation(**{**paths, **defaults, **values})
 
 
 def without_times(rows: list[TrialRow]) -> list[str]:
     return [repr(replace(row, seconds=0.0)) for row in rows]
-
-
-def records_of(evaluation: Evaluation) -> dict[str, ReachRecord]:
-    return {record.key: record for record in evaluation.reaches.records()}
 
 
 def quiet(_: str) -> None:
@@ -79,14 +55,11 @@ def test_strategies_are_tried_at_the_same_goals_of_the_same_environments(
     asked = evaluation(tmp_path)
     lines: list[str] = []
     rows = run_evaluation(asked, say=lines.append)
-    records = records_of(asked)
+    records = {record.key: record for record in asked.reaches.records()}
     scenario = asked.reaches.scenario()
     firsts = [row for row in rows if row.attempt == 1]
-    tried = {
-        method: [(row.environment, row.goal) for row in firsts if row.method == method]
-        for method in asked.methods
-    }
-    assert tried["rnd"] == tried["gp1"] == [(e, g) for e in range(3) for g in (0, 1)]
+    tried = [(row.environment, row.goal) for row in firsts]  # First gp1's, then RND's.
+    assert tried == 2 * [(e, g) for e in range(3) for g in (0, 1)]
     for row in rows:
         record = records[row.key]
         assert (record.stream, record.environment) == ("evaluation", row.environment)
@@ -101,9 +74,9 @@ def test_strategies_are_tried_at_the_same_goals_of_the_same_environments(
 def test_rows_agree_with_the_library_of_reaches(tmp_path: Path, calls: list[str]) -> None:
     asked = evaluation(tmp_path, attempts=3)
     rows = run_evaluation(asked, say=quiet)
-    records, scenario = records_of(asked), asked.reaches.scenario()
-    assert len(calls) == len(set(calls)) == len(records)
-    assert set(records) == {row.key for row in rows} == set(calls)
+    records = {record.key: record for record in asked.reaches.records()}
+    scenario = asked.reaches.scenario()
+    assert sorted(records) == sorted({row.key for row in rows}) == sorted(calls)
     trials: dict[tuple[str, int, int], list[TrialRow]] = {}
     for row in rows:
         assert row.success == records[row.key].success
@@ -112,7 +85,6 @@ def test_rows_agree_with_the_library_of_reaches(tmp_path: Path, calls: list[str]
     assert any(len(trial) == 3 for trial in trials.values())
     for trial in trials.values():
         assert [row.attempt for row in trial] == list(range(1, len(trial) + 1))
-        assert not any(row.success for row in trial[:-1])
         assert trial[-1].success or len(trial) == 3
         # Each attempt finds the environment as the previous ones left it.
         chain = [ReachRequest.from_record(records[row.key], scenario) for row in trial]
@@ -156,7 +128,7 @@ def test_an_interrupted_evaluation_simulates_nothing_twice(
     tmp_path: Path, calls: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(dut, "SAY_S", 0.0)
-    asked = evaluation(tmp_path, environments=5)
+    asked = evaluation(tmp_path, environments=5, methods=("rnd", "cost"))
     expected = without_times(run_evaluation(replace(asked, results=tmp_path / "whole"), say=quiet))
     calls.clear()
     lines: list[str] = []
@@ -194,7 +166,7 @@ def test_the_file_keeps_trials_of_other_variants_and_strategies(
 def test_apertures_are_evaluated_with_bases_and_strategies_may_follow_others(
     tmp_path: Path, calls: list[str]
 ) -> None:
-    make_library(tmp_path / "library", "cylinder-aperture-clutter")
+    planar_library(tmp_path / "library", load_scenario("cylinder-aperture-clutter", EASY))
     asked = evaluation(tmp_path, methods=("rnd", "cost", "gp", "rnd>cost"), goals=1)
     rows = run_evaluation(asked, say=quiet)
     scenario = asked.reaches.scenario()
@@ -228,7 +200,7 @@ def test_processes_and_a_cluster_give_the_rows_and_reaches_of_this_process(
     assert max(record.duration_s for record in asked.reaches.records()) == pytest.approx(0.2)
 
 
-def test_unknown_methods_and_results_of_other_scenarios_are_rejected_before_any_reach(
+def test_what_cannot_be_evaluated_is_refused_before_any_reach(
     tmp_path: Path, calls: list[str]
 ) -> None:
     with pytest.raises(RequestError, match="unknown method 'svm'"):
@@ -236,17 +208,63 @@ def test_unknown_methods_and_results_of_other_scenarios_are_rejected_before_any_
     assert not (tmp_path / "out").exists()
     asked = evaluation(tmp_path, methods=("rnd",))
     run_evaluation(asked, say=quiet)
-    make_library(tmp_path / "other", overrides="{stop: {timeout_s: 0.4}}")
     calls.clear()
     with pytest.raises(LibraryError, match="holds reaches of scenario"):
-        run_evaluation(replace(asked, experience=tmp_path / "other"), say=quiet)
+        run_evaluation(replace(asked, overrides="{stop: {timeout_s: 0.4}}"), say=quiet)
+    # What a worker cannot read is an error here.
+    (shard, *_) = ExperienceLibrary(tmp_path / "library").shard_paths()
+    shard.write_bytes(shard.read_bytes()[:-100])
+    with pytest.raises(LibraryError, match="is damaged or not a Parquet file"):
+        run_evaluation(asked, say=quiet)
     assert calls == []
 
 
-def test_errors_in_a_worker_are_passed_on(tmp_path: Path) -> None:
-    asked = evaluation(tmp_path)
-    (shard, *_) = ExperienceLibrary(tmp_path / "library").shard_paths()
-    content = shard.read_bytes()
-    shard.write_bytes(content[: len(content) // 2])
-    with pytest.raises(LibraryError, match="is damaged or not a Parquet file"):
-        run_evaluation(asked, say=quiet)
+# The PR2, whose experience is made up
+
+
+@pytest.fixture(scope="module")
+def spheres(tmp_path_factory: pytest.TempPathFactory) -> ExperienceLibrary:
+    return sphere_library(tmp_path_factory.mktemp("spheres"))
+
+
+def test_an_evaluation_may_block_apertures_and_keep_the_robot_where_it_is(
+    spheres: ExperienceLibrary, tmp_path: Path
+) -> None:
+    asked = Evaluation(
+        experience=spheres.path,
+        results=tmp_path / "evaluation",
+        methods=("rnd", "knn1"),
+        environments=2,
+        goals=1,
+        overrides="{clutter: {num_blocked: 15}}",
+        moves=False,
+    )
+    assert len(run_evaluation(asked, say=quiet)) == 8
+    records = asked.reaches.records()
+    assert {record.scenario for record in records} == {asked.scenario().digest}
+    assert {(record.base_y, record.torso) for record in records} == {(0.0, 0.15)}
+    for record in records:
+        instance = asked.scenario().sample_instance("evaluation", record.environment)
+        assert instance.p_WA is not None and len(instance.p_WA) == 5
+        assert np.min(np.linalg.norm(instance.p_WA - record.start.x0[:3], axis=1)) < 1e-9
+
+
+@pytest.mark.usefixtures("_renderer")
+def test_strategies_are_compared_by_what_the_cameras_see(
+    spheres: ExperienceLibrary, tmp_path: Path
+) -> None:
+    asked = Evaluation(
+        experience=spheres.path,
+        results=tmp_path,
+        methods=("cost",),
+        environments=1,
+        goals=1,
+        attempts=1,
+        scenario_name="foliage-aperture-clutter",
+        overrides="{stop: {timeout_s: 0.2}, clutter: {num_stems: 3, num_branches: 1}}",
+        cameras=str(small_cameras(tmp_path / "small.yaml")),
+    )
+    run_evaluation(asked, say=quiet)
+    (record,) = asked.reaches.records()
+    true = asked.scenario().sample_goal("evaluation", 0)
+    assert 1e-4 < np.linalg.norm(record.p_WG - true) < 0.05
