@@ -26,52 +26,39 @@ def test_the_defaults_are_the_papers_passage() -> None:
 
 
 POINTS = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)).map(list)
-SLOPES = st.tuples(st.floats(-90.0, 90.0), st.floats(-90.0, 90.0)).map(sorted)
-
-
-@given(
-    st.floats(1e-3, 0.5),
-    st.floats(1e-2, 1.0),
-    st.floats(1e-3, 0.1),
-    POINTS,
-    POINTS,
-    SLOPES,
-    st.integers(0, 2**32 - 1),
+PASSAGES = st.builds(
+    PassageClutter,
+    gap_m=st.floats(1e-3, 0.5),
+    wall_length_m=st.floats(1e-2, 1.0),
+    wall_width_m=st.floats(1e-3, 0.1),
+    centre_from=POINTS,
+    centre_to=POINTS,
+    min_slope_deg=st.floats(-90.0, 10.0),
+    max_slope_deg=st.floats(10.0, 90.0),
 )
+
+
+@given(PASSAGES, st.integers(0, 2**32 - 1))
 def test_whatever_the_slope_the_gap_is_exact_and_the_goal_in_its_middle(
-    gap: float,
-    length: float,
-    width: float,
-    begin: list[float],
-    end: list[float],
-    slopes: list[float],
-    index: int,
+    passage: PassageClutter, index: int
 ) -> None:
-    passage = PassageClutter(
-        gap_m=gap,
-        wall_length_m=length,
-        wall_width_m=width,
-        centre_from=begin,
-        centre_to=end,
-        min_slope_deg=slopes[0],
-        max_slope_deg=slopes[1],
-    )
+    begin, end = passage.centre_from, passage.centre_to
     instance = sample(passage, index)
     # On the segment: the ways to both ends add up to its length.
     assert instance.p_WG is not None and instance.p_WG[2] == 0.0
     ways = np.linalg.norm(instance.p_WG[:2] - np.array([begin, end]), axis=1)
     assert ways.sum() == pytest.approx(np.linalg.norm(np.subtract(end, begin)), abs=1e-9)
     yaw = instance.yaw[0]
-    assert slopes[0] - 1e-9 <= np.rad2deg(yaw) <= slopes[1] + 1e-9
+    assert passage.min_slope_deg - 1e-9 <= np.rad2deg(yaw) <= passage.max_slope_deg + 1e-9
     # Seen from the goal along the passage and across it.
     along, across = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
     left, right = (corners(instance, i) - instance.p_WG[:2] for i in (0, 1))
     for wall in (left, right):
-        assert np.ptp(wall @ along) == pytest.approx(length)
-        assert np.ptp(wall @ across) == pytest.approx(width)
-        assert (wall @ along).min() == pytest.approx(-0.5 * length)
-    assert (left @ across).min() == pytest.approx(0.5 * gap)
-    assert (right @ across).max() == pytest.approx(-0.5 * gap)
+        assert np.ptp(wall @ along) == pytest.approx(passage.wall_length_m)
+        assert np.ptp(wall @ across) == pytest.approx(passage.wall_width_m)
+        assert (wall @ along).min() == pytest.approx(-0.5 * passage.wall_length_m)
+    assert (left @ across).min() == pytest.approx(0.5 * passage.gap_m)
+    assert (right @ across).max() == pytest.approx(-0.5 * passage.gap_m)
 
 
 def test_centres_and_slopes_are_uniform_and_independent() -> None:
