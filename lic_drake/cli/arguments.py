@@ -1,109 +1,129 @@
-"""What subcommands share when they declare their arguments."""
+"""What subcommands share: how they are declared, common options, exit codes, output."""
 
 import argparse
+import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from lic_drake.paths import find_library
 
 if TYPE_CHECKING:
     from lic_drake.experience.workers import Workers
 
-    type Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
-else:
-    Subparsers = argparse._SubParsersAction  # Takes no brackets where programs run.
-"""What `add_parser` of a subcommand gets."""
+type Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
+"""The object that subcommands add their parsers to."""
+
+INCOMPLETE, USER_ERROR, INTERRUPTED, BROKEN_PIPE = 1, 2, 130, 141
+"""Exit codes: the result is incomplete or differs; invalid input; Ctrl-C; output closed."""
+
+DEFAULT_SCENARIO = "cylinder-clutter"
+"""Scenario, and library, of commands that are given none."""
 
 
-def positive_int(text: str) -> int:
-    """Reads a whole number of 1 or more; for `type=` of an argument."""
-    try:
-        value = int(text)
-    except ValueError:
-        value = 0
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"needs a whole number of 1 or more, got {text!r}")
-    return value
+def whole_number(least: int) -> Callable[[str], int]:
+    """Returns a reader of whole numbers with a minimum, for `type=`."""
+
+    def read(text: str) -> int:
+        value = int(text) if text.isdecimal() else -1
+        if value < least:
+            limit = f"{least} or more"
+            raise argparse.ArgumentTypeError(f"needs a whole number of {limit}, got {text!r}")
+        return value
+
+    return read
 
 
-def non_negative_int(text: str) -> int:
-    """Reads a whole number of 0 or more; for `type=` of an argument."""
-    try:
-        value = int(text)
-    except ValueError:
-        value = -1
-    if value < 0:
-        raise argparse.ArgumentTypeError(f"needs a whole number of 0 or more, got {text!r}")
-    return value
-
-
-def add_scenario_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds --scenario and --set."""
-    parser.add_argument(
-        "--scenario",
-        metavar="NAME|FILE",
-        default="cylinder-clutter",
-        help="shipped scenario or path of a .yaml file (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--set",
-        metavar="YAML",
-        default="",
-        help='values put over the scenario, for instance "{stop: {timeout_s: 20}}", SI units'
+_SHARED: dict[str, dict[str, Any]] = {
+    "--scenario": {
+        "metavar": "NAME|FILE",
+        "default": "",
+        "help": "shipped scenario or path of a .yaml file (default: the library's, else"
+        f" {DEFAULT_SCENARIO})",
+    },
+    "--set": {
+        "metavar": "YAML",
+        "default": "",
+        "help": 'scenario values to override, in SI units, e.g. "{stop: {timeout_s: 20}}"'
         " (default: none)",
+    },
+    "--stream": {
+        "metavar": "NAME",
+        "help": "seed stream of the environments: training, evaluation, calibration or holdout"
+        " (default: the library's, else training, for lic collect; otherwise evaluation)",
+    },
+    "--goal": {
+        "metavar": "METRES",
+        "type": float,
+        "nargs": "+",
+        "help": "goal in metres, X Y in the plane, X Y Z for the PR2; x points into the clutter"
+        " (default: lic reach takes the environment's goal, else 0.6 0)",
+    },
+    "--method": {
+        "metavar": "NAME",
+        "default": "gp",
+        "help": "selection strategy: rnd, cost, knn or gp (default: %(default)s)",
+    },
+    "--library": {
+        "metavar": "NAME|FOLDER",
+        "type": find_library,
+        "help": "experience library: a folder, or the name of a shipped one (default: shipped ones;"
+        f" for lic select and lic evaluate {DEFAULT_SCENARIO})",
+    },
+    "--seed": {
+        "metavar": "N",
+        "type": whole_number(0),
+        "default": 0,
+        "help": "environment, and seed of random choices (default: %(default)s)",
+    },
+    "--workers": {
+        "metavar": "N",
+        "type": whole_number(1),
+        "help": "number of environments simulated in parallel, 200 MB of memory each (default: CPU"
+        " count, or all workers of the scheduler)",
+    },
+    "--scheduler": {
+        "metavar": "ADDRESS",
+        "help": "Dask scheduler to simulate on, e.g. tcp://node1:8786 (default: local processes)",
+    },
+    "--json": {"action": "store_true", "help": "print a JSON object (default: text)"},
+}
+
+
+def add_command(
+    subparsers: Subparsers,
+    name: str,
+    run: Callable[[argparse.Namespace], int],
+    help: str,
+    more: str,
+    example: str,
+    options: Sequence[str] = (),
+) -> argparse.ArgumentParser:
+    """Adds a subcommand, run by `run`, which returns the exit code, with some shared options."""
+    parser = subparsers.add_parser(
+        name,
+        help=help,
+        description=f"{help[0].upper()}{help[1:]}. {more}".strip(),
+        epilog=f"example: {example}",
     )
+    for option in options:
+        parser.add_argument(option, **_SHARED[option])
+    parser.set_defaults(run=run, parser=parser)
+    return parser
 
 
-def add_method_argument(parser: argparse.ArgumentParser) -> None:
-    """Adds --method, the strategy that selects."""
-    parser.add_argument(
-        "--method",
-        default="gp",
-        metavar="NAME",
-        help="strategy that selects: rnd, cost, knn or gp (default: %(default)s)",
-    )
-
-
-def library_path(text: str) -> Path:
-    """Reads a library's folder or file, or the name of a shipped one; for `type=`."""
-    from lic_drake.paths import find_library
-
-    return find_library(text)
-
-
-def add_library_argument(
-    parser: argparse.ArgumentParser, default: str = "the shipped one for cylinder-clutter"
+def add_count(
+    parser: argparse.ArgumentParser, name: str, default: int, help: str, least: int = 1
 ) -> None:
-    """Adds --library, what strategies learn from."""
-    parser.add_argument(
-        "--library",
-        type=library_path,
-        metavar="NAME|FOLDER",
-        help=f"experience library: a folder, or the name of a shipped one (default: {default})",
-    )
-
-
-def add_workers_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds --workers and --scheduler, where reaches are simulated."""
-    parser.add_argument(
-        "--workers",
-        metavar="N",
-        type=positive_int,
-        help="number of environments at work at a time; a process takes 200 MB of memory (default:"
-        " CPU count, or all workers of the scheduler)",
-    )
-    parser.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="simulate on the workers of a Dask scheduler, for instance tcp://node1:8786 (default:"
-        " in processes on this machine)",
-    )
+    """Adds an option that takes a whole number with a minimum."""
+    help = f"{help} (default: %(default)s)"
+    parser.add_argument(name, metavar="N", type=whole_number(least), default=default, help=help)
 
 
 @contextmanager
 def workers_of(args: argparse.Namespace) -> "Iterator[Workers]":
-    """Gives the workers that --workers and --scheduler ask for."""
+    """Provides the workers for --workers and --scheduler."""
     from lic_drake.experience.workers import DaskWorkers, LocalWorkers
 
     if args.scheduler is None:
@@ -112,14 +132,31 @@ def workers_of(args: argparse.Namespace) -> "Iterator[Workers]":
         return
     with DaskWorkers(args.scheduler, args.workers) as cluster:
         if cluster.capacity() == 0:
-            print(
+            remark(
                 "lic: the scheduler has no workers yet, waiting for some; start them with:"
-                f" dask worker {args.scheduler} --nworkers -1 --nthreads 1",
-                file=sys.stderr,
+                f" dask worker {args.scheduler} --nworkers -1 --nthreads 1"
             )
         yield cluster
 
 
-def add_json_argument(parser: argparse.ArgumentParser) -> None:
-    """Adds --json, for output that a machine reads."""
-    parser.add_argument("--json", action="store_true", help="print one JSON object (default: text)")
+def print_result(
+    args: argparse.Namespace, values: Mapping[str, Any], text: str | None = None
+) -> None:
+    """Prints values as JSON, or as a text that by default has a line for each of them."""
+    width = max(map(len, values))
+    lines = (f"{name:{width}}  {_shown(value)}" for name, value in values.items())
+    print(json.dumps(values) if args.json else text or "\n".join(lines))
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {_shown(item)}" for name, item in value.items()) or "none"
+    if isinstance(value, list | tuple):
+        first = ", ".join(map(_shown, value[:10])) or "none"
+        return f"{first}, ..." if len(value) > 10 else first
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def remark(line: str) -> None:
+    """Prints a line on the standard error, which keeps progress apart from results."""
+    print(line, file=sys.stderr, flush=True)

@@ -1,130 +1,134 @@
-"""`lic demo`: select with LIC, reach, record."""
+"""`lic demo` shows one reach; `lic gallery` shows selected reaches on one static page."""
 
 import argparse
 from pathlib import Path
-from typing import NamedTuple
 
-from lic_drake.cli.arguments import (
-    Subparsers,
-    add_library_argument,
-    add_method_argument,
-    non_negative_int,
-)
+from lic_drake.cli.arguments import Subparsers, add_command, add_count, print_result, remark
+from lic_drake.errors import LicError, check_writable
+from lic_drake.paths import shipped_libraries, shipped_library
 
-
-class _Demonstration(NamedTuple):
-    """What is shown of a category unless told otherwise."""
-
-    robot: str
-    library: str
-    overrides: str = ""
-    cameras: str | None = None
-
-
-_DEMONSTRATIONS = {
-    "cylinder-clutter": _Demonstration("planar-arm", "cylinder-clutter"),
-    "passage-clutter": _Demonstration("planar-arm", "passage-clutter"),
-    "cylinder-aperture-clutter": _Demonstration("planar-arm", "cylinder-aperture-clutter"),
-    "sphere-aperture-clutter": _Demonstration(
-        "pr2", "sphere-aperture-clutter", "{clutter: {num_blocked: 8}}"
-    ),
-    # Learned among spheres: the transfer is the point (paper V-B).
-    "foliage-aperture-clutter": _Demonstration("pr2", "sphere-aperture-clutter", cameras="foliage"),
+_FOLIAGE, _SPHERES = "foliage-aperture-clutter", "sphere-aperture-clutter"
+_CATEGORIES = {
+    "planar-arm": ("cylinder-clutter", "passage-clutter", "cylinder-aperture-clutter"),
+    "pr2": (_SPHERES, _FOLIAGE),
 }
-_USUAL = {"planar-arm": "cylinder-clutter", "pr2": "sphere-aperture-clutter"}
+"""Categories of each robot, the default one first."""
 
 
 def add_parser(subparsers: Subparsers) -> None:
-    """Adds the subcommand to the command line."""
-    parser = subparsers.add_parser(
+    """Adds both subcommands to the command line."""
+    parser = add_command(
+        subparsers,
         "demo",
-        help="select a start from past experience, reach into unseen clutter, record it",
-        description="Draws an environment that is in no library, selects a start pose from the"
-        " shipped experience library, reaches, and tries once more if that fails. Writes demo.html"
-        " (a recording that plays offline), path.png, demo.json, the estimated success over the"
-        " starts (density.png in the plane, apertures.png for the PR2) and, with a renderer, stills"
-        " of every attempt (attempt1_start.png and so on). Before foliage also sequence.html, with"
-        " what the cameras saw, look1.png and so on, and views.webp.",
-        epilog="example: lic demo --robot pr2 --seed 3 --out out",
+        run,
+        "select a start, reach into unseen clutter, and record it",
+        "Tries once more if the reach fails. Writes a recording that plays offline (demo.html),"
+        " demo.json, pictures and, if rendering is available, stills; for foliage also what the"
+        " cameras saw (sequence.html, views.webp).",
+        "lic demo --robot pr2 --seed 3 --out out",
+        ["--seed", "--method", "--library", "--set"],
     )
     parser.add_argument(
-        "--robot",
-        choices=tuple(_USUAL),
-        default="planar-arm",
-        help="planar-arm among cylinders, or pr2 before a board with blocked apertures (default:"
-        " %(default)s)",
+        "--robot", choices=list(_CATEGORIES), help="robot (default: that of the category)"
     )
     parser.add_argument(
         "--category",
-        choices=tuple(_DEMONSTRATIONS),
-        metavar="NAME",
-        help="clutter category: cylinder-clutter, passage-clutter or cylinder-aperture-clutter for"
-        " planar-arm; sphere-aperture-clutter or foliage-aperture-clutter for pr2, the latter with"
-        " cameras that find apertures and goal (default: the first one of the robot)",
-    )
-    parser.add_argument(
-        "--seed",
-        type=non_negative_int,
-        default=0,
-        metavar="N",
-        help="chooses environment and goal (default: 0)",
-    )
-    add_method_argument(parser)
-    add_library_argument(parser, "the shipped one for the category, spheres for foliage")
-    parser.add_argument(
-        "--set",
-        metavar="YAML",
-        help="values put over the scenario (default: none; for spheres"
-        f' "{_DEMONSTRATIONS["sphere-aperture-clutter"].overrides}")',
+        choices=sum(_CATEGORIES.values(), ()),
+        help="clutter category; in foliage, cameras find apertures and goal (default: the first"
+        " one of the robot)",
     )
     parser.add_argument(
         "--visuals",
-        choices=("primitives", "drake_models"),
+        choices=["primitives", "drake_models"],
         default="primitives",
-        help="what the PR2 looks like: the shapes of its own model, or the meshes of Drake's public"
-        " one, package://drake_models, found in ROS_PACKAGE_PATH or in the cache of Drake's"
-        " downloads (default: %(default)s)",
+        help="appearance of the PR2: primitives, or the meshes of package://drake_models, found in"
+        " ROS_PACKAGE_PATH or the cache of Drake's downloads (default: %(default)s)",
     )
     parser.add_argument(
         "--out", type=Path, default=Path("out"), help="folder to write to (default: %(default)s)"
     )
-    parser.set_defaults(run=run)
+    gallery = add_command(
+        subparsers,
+        "gallery",
+        run_gallery,
+        "show selected reaches on one static page",
+        "Writes index.html, which works offline: recordings, stills and numbers of successful and"
+        " failed reaches of each category, in environments that are in no library.",
+        "lic gallery out/gallery --each 2",
+        ["--method", "--library", "--seed", "--json"],
+    )
+    gallery.add_argument("out", metavar="OUT", type=Path, help="folder to write to")
+    add_count(gallery, "--each", 1, "number of successes, and of failures, per category")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Runs the subcommand and returns the exit code."""
-    from lic_drake.errors import LicError
+    """Runs the demonstration and prints the files it has written."""
     from lic_drake.experience.schema import scenario_text
     from lic_drake.experience.store import ExperienceLibrary
-    from lic_drake.paths import shipped_library
     from lic_drake.perception.config import load_cameras
     from lic_drake.reach.scenario import load_scenario, parse_scenario
     from lic_drake.show.demonstration import demonstrate
     from lic_drake.show.pr2_meshes import find_drake_models
 
-    category = args.category or _USUAL[args.robot]
-    usual = _DEMONSTRATIONS[category]
-    if usual.robot != args.robot:
-        raise LicError(f"{category} is for --robot {usual.robot}, not {args.robot}")
-    if args.visuals == "drake_models" and args.robot != "pr2":
-        raise LicError(f"--visuals drake_models is for --robot pr2, not {args.robot}; leave it out")
-    drake_models = find_drake_models() if args.visuals == "drake_models" else None
-    library = ExperienceLibrary(args.library or shipped_library(usual.library))
-    overrides = usual.overrides if args.set is None else args.set
-    if usual.library == category:
-        scenario = parse_scenario(scenario_text(library.scenario()), overrides, source="--set")
-    else:
+    category = args.category or _CATEGORIES[args.robot or "planar-arm"][0]
+    foliage, meshes = category == _FOLIAGE, args.visuals == "drake_models"
+    overrides = args.set or ("{clutter: {num_blocked: 8}}" if category == _SPHERES else "")
+    # In foliage, experience comes from spheres: the demonstration is about transfer (paper V-B).
+    library = ExperienceLibrary(args.library or shipped_library(_SPHERES if foliage else category))
+    if foliage:
         scenario = load_scenario(category, overrides)
-    cameras = None if usual.cameras is None else load_cameras(usual.cameras)
+    else:
+        scenario = parse_scenario(scenario_text(library.scenario()), overrides, source="--set")
+    if args.robot not in (None, scenario.robot):
+        raise LicError(f"{scenario.category} is for --robot {scenario.robot}, not {args.robot}")
+    if meshes and scenario.robot != "pr2":
+        raise LicError(f"--visuals drake_models is for --robot pr2, not {scenario.robot}; omit it")
     result = demonstrate(
         scenario,
         library,
         args.method,
         args.seed,
         args.out,
-        drake_models=drake_models,
-        cameras=cameras,
+        drake_models=find_drake_models() if meshes else None,
+        cameras=load_cameras("foliage") if foliage else None,
     )
     for kind, path in result.files.items():
         print(f"{kind}: {path}")
+    return 0
+
+
+def run_gallery(args: argparse.Namespace) -> int:
+    """Writes the page."""
+    from lic_drake.experience.schema import write_atomically
+    from lic_drake.experience.store import ExperienceLibrary
+    from lic_drake.select.registry import check_method
+    from lic_drake.show.gallery import choose_exhibits, make_gallery, numbers_of
+
+    check_method(args.method)
+    check_writable(args.out)
+    paths = [args.library] if args.library else shipped_libraries()
+    libraries = [ExperienceLibrary(path) for path in paths]
+    for library in libraries:  # Fails before the first one is learned from.
+        library.scenario()
+    exhibits = [
+        exhibit
+        for library in libraries
+        for exhibit in choose_exhibits(library, args.method, args.each, args.seed, say=remark)
+    ]
+    path = args.out / "index.html"
+    page = make_gallery(exhibits, args.method)
+    write_atomically(path, lambda temporary: temporary.write_text(page, encoding="utf-8"))
+    trials = [
+        {
+            "category": exhibit.scenario.category,
+            "environment": exhibit.environment,
+            "goal": exhibit.p_WG.tolist(),
+            "success": exhibit.success,
+            "attempts": [numbers_of(i, a) for i, a in enumerate(exhibit.attempts, start=1)],
+        }
+        for exhibit in exhibits
+    ]
+    values = {"page": str(path), "method": args.method, "trials": trials}
+    text = f"page: {path} ({len(page) / 1e6:.1f} MB, {len(exhibits)} trials)"
+    print_result(args, values, text)
     return 0

@@ -1,4 +1,4 @@
-"""The `lic` command. A subcommand is a module with `add_parser` and `run`, and a line here."""
+"""The `lic` command. Subcommands are added by the modules listed here."""
 
 import argparse
 import os
@@ -6,21 +6,11 @@ import sys
 from collections.abc import Sequence
 
 import lic_drake
-from lic_drake.cli import (
-    bench,
-    collect,
-    demo,
-    evaluate,
-    exit_codes,
-    experience,
-    gallery,
-    reach,
-    select,
-)
-from lic_drake.cli.arguments import Subparsers
+from lic_drake.cli import collect, demo, evaluate, experience, reach, select
+from lic_drake.cli.arguments import BROKEN_PIPE, INTERRUPTED, USER_ERROR, remark
 from lic_drake.errors import LicError
 
-SUBCOMMANDS = (demo, reach, select, collect, experience, evaluate, gallery, bench)
+SUBCOMMANDS = (demo, reach, select, collect, experience, evaluate)
 """Modules with `add_parser(subparsers)`, which sets `run(args) -> int` as a parser default."""
 
 
@@ -28,25 +18,27 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Runs the command line and returns the exit code.
 
     Args:
-        argv: Arguments without the program's name; those of the process by default.
+        argv: Arguments without the program name; those of the process by default.
     """
     args, unknown = make_parser().parse_known_args(argv)
-    if unknown:  # The subcommand's own parser knows what it takes.
+    if unknown:  # Reported with the usage of the subcommand.
         args.parser.error(f"unrecognized arguments: {' '.join(unknown)}")
     try:
         code: int = args.run(args)
         sys.stdout.flush()
         return code
     except LicError as error:
-        print(f"lic: error: {' '.join(str(error).split())}", file=sys.stderr)
-        return exit_codes.USER_ERROR
+        remark(f"lic: error: {' '.join(str(error).split())}")
+        return USER_ERROR
     except KeyboardInterrupt:
-        print("lic: interrupted", file=sys.stderr)
-        return exit_codes.INTERRUPTED
+        resumable = args.run in (collect.run, evaluate.run)
+        hint = "; finished environments are kept, run the same command to resume"
+        remark(f"lic: interrupted{hint if resumable else ''}")
+        return INTERRUPTED
     except BrokenPipeError:
-        # The reader has gone (`lic ... | head`); Python must not complain when it flushes at exit.
+        # As in `lic ... | head`; keeps Python from complaining when it flushes at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return exit_codes.BROKEN_PIPE
+        return BROKEN_PIPE
 
 
 def make_parser() -> argparse.ArgumentParser:
@@ -54,20 +46,10 @@ def make_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="lic",
         description="Learning initial conditions for reaching into unknown clutter, on Drake.",
-        epilog="Each subcommand explains itself: lic collect --help",
+        epilog="Help on a subcommand: lic collect --help",
     )
     parser.add_argument("--version", action="version", version=f"lic {lic_drake.__version__}")
     subparsers = parser.add_subparsers(title="subcommands", metavar="SUBCOMMAND", required=True)
     for subcommand in SUBCOMMANDS:
         subcommand.add_parser(subparsers)
-    _name_parsers(subparsers)
     return parser
-
-
-def _name_parsers(subparsers: Subparsers) -> None:
-    """Lets parsed arguments know the parser of their subcommand."""
-    for parser in subparsers.choices.values():
-        parser.set_defaults(parser=parser)
-        for action in parser._actions:
-            if isinstance(action, argparse._SubParsersAction):
-                _name_parsers(action)

@@ -126,3 +126,13 @@ def _shifted(x0: Vector, b0: Vector) -> Vector:
     axes = 2 if x0.shape[1] == IN_PLANE else 3
     x0_R[:, :axes] -= b0[:, :axes]
     return x0_R
+
+
+def describe_start(start: Start) -> str:
+    """Returns a start in words."""
+    x0, (x, y, torso) = start.x0, start.b0
+    base = f", base at y {y:+.3f} m" if x or y else ""
+    if len(x0) == IN_PLANE:
+        return f"y {x0[1]:+.3f} m, phi {np.rad2deg(x0[2]):+.1f} degrees{base}"
+    position = ", ".join(f"{value:.3f}" for value in x0[:3])
+    return f"the aperture at ({position}) m{base}, torso at {torso:.3f} m"

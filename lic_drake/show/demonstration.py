@@ -18,10 +18,11 @@ from lic_drake.perception.observer import Observer
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.session import make_record, simulate_request
+from lic_drake.reach.start import describe_start
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.registry import Selector, make_selector, needs_library
-from lic_drake.show.figures import ShownTrial, describe_start, is_reachable
+from lic_drake.show.figures import ShownTrial, is_reachable
 from lic_drake.show.pictures import remove_pictures, save_pictures
 from lic_drake.starts import FeasibleStarts, make_starts
 from lic_drake.types import Vector

@@ -13,7 +13,6 @@ from lic_drake.errors import LicError, readable_errors
 from lic_drake.evaluate.trial import Attempt
 from lic_drake.reach.request import is_within_reach
 from lic_drake.reach.scenario import Scenario
-from lic_drake.reach.start import IN_PLANE, Start
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.situation import FailedReach, Situation
@@ -94,16 +93,6 @@ def estimate_title(selector: LicSelector, number: int, attempt: Attempt) -> str:
     model = 1 if selector.second is None else min(number, 2)
     outcome = attempt.record.outcome
     return f"attempt {number}, LIC-{model} ({selector.method}): {outcome}"
-
-
-def describe_start(start: Start) -> str:
-    """Returns a start in words."""
-    x0, (x, y, torso) = start.x0, start.b0
-    base = f", base at y {y:+.3f} m" if x or y else ""
-    if len(x0) == IN_PLANE:
-        return f"y {x0[1]:+.3f} m, phi {np.rad2deg(x0[2]):+.1f} degrees{base}"
-    position = ", ".join(f"{value:.3f}" for value in x0[:3])
-    return f"the aperture at ({position}) m{base}, torso at {torso:.3f} m"
 
 
 def is_reachable(scenario: Scenario, stream: str, environment: int, p_WG: Vector) -> bool:

