@@ -33,16 +33,9 @@ def check_numbers(
 ) -> None:
     """Validates numeric fields, given by name; each is a number or a list of numbers.
 
-    Args:
-        config: The configuration.
-        finite: Fields that must be finite.
-        positive: Fields that must be positive and finite.
-        non_negative: Fields that must be non-negative and finite.
-        ranges: Minimum and maximum of fields, which may be infinite.
-        vectors: Number of components of fields, all finite.
-        intervals: Fields that must be [least, most].
-        ascending: Pairs of fields; no component of the first may exceed that of the second.
-        error: Exception to raise.
+    Limits in `ranges` may be infinite; other numbers must be finite. `vectors` gives numbers of
+    components, `intervals` fields that are [least, most], `ascending` pairs of fields of which no
+    component of the first may exceed that of the second.
 
     Raises:
         LicError: A field is invalid; the message names it, its value and the limit.
@@ -76,12 +69,8 @@ def check_numbers(
 def read_mapping(text: str | bytes, source: str) -> dict[str, Any]:
     """Parses a YAML mapping safely; empty text is an empty mapping.
 
-    Args:
-        text: The text.
-        source: Its origin, for messages.
-
     Raises:
-        ScenarioError: It is longer than `MAX_YAML_BYTES` or not a YAML mapping.
+        ScenarioError: The text, from `source`, is longer than `MAX_YAML_BYTES` or not a YAML mapping.
     """
     if len(text) > MAX_YAML_BYTES:
         raise ScenarioError(f"{source}: YAML of {len(text)} bytes; at most {MAX_YAML_BYTES}")
@@ -108,14 +97,10 @@ def merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
 def read_section[T](schema: type[T], data: Any, source: str, defaults: T | None = None) -> T:
     """Fills a dataclass by Drake's typed YAML reader, which rejects unknown keys.
 
-    Args:
-        schema: The dataclass; each field needs a default.
-        data: A mapping of its fields, or None for an empty one.
-        source: Its origin, for messages.
-        defaults: Values of omitted fields; those of the dataclass by default.
+    Each field needs a default; `defaults` replaces those of the dataclass.
 
     Raises:
-        ScenarioError: A key or value is invalid.
+        ScenarioError: A key or value is invalid; the message names the `source`.
     """
     from pydrake.common.yaml import yaml_load_typed  # Configurations alone do not need Drake.
 

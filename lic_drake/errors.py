@@ -50,10 +50,7 @@ def quoted(value: object) -> str:
 
 @contextmanager
 def readable_errors(path: Path, action: str) -> Iterator[None]:
-    """Turns system errors (no permission, disk full) of an action on a path into a `LibraryError`.
-
-    The action goes into the message: "write", "create the folder".
-    """
+    """Turns system errors of an action on a path, such as "write", into a `LibraryError`."""
     try:
         yield
     except OSError as error:
@@ -63,11 +60,7 @@ def readable_errors(path: Path, action: str) -> Iterator[None]:
 
 
 def check_writable(folder: Path) -> None:
-    """Creates a folder and checks that it is writable, before any work starts.
-
-    Raises:
-        LibraryError: It is not.
-    """
+    """Creates a folder; raises a `LibraryError` unless it is writable."""
     with readable_errors(folder, "write into"):
         folder.mkdir(parents=True, exist_ok=True)
         probe = folder / ".write-test"

@@ -7,13 +7,8 @@ from statistics import NormalDist
 def wilson_interval(successes: int, n: int, confidence: float = 0.9) -> tuple[float, float]:
     """Returns the Wilson score interval of a binomial proportion (Wilson 1927).
 
-    Args:
-        successes: Number of successes, 0 to n.
-        n: Number of trials; the interval is (0, 1) if there are none.
-        confidence: Coverage, between 0 and 1; the paper's figures show 0.9.
-
-    Raises:
-        ValueError: The counts or the confidence are out of range.
+    It is (0, 1) without trials. The paper shows a confidence of 0.9. Raises a ValueError if the
+    counts or the confidence are out of range.
     """
     if not 0 <= successes <= n:
         raise ValueError(f"successes must be from 0 to n, got {successes} of {n}")

@@ -15,9 +15,6 @@ class Registry[T]:
 
     A lookup first imports the modules in `LIC_EXTENSIONS`, so that the command line and worker
     processes, which inherit the environment, know their entries.
-
-    Attributes:
-        entries: The entries registered so far.
     """
 
     def __init__(self, kind: str, error: type[LicError]) -> None:
@@ -30,11 +27,7 @@ class Registry[T]:
     def register(self, name: str, entry: T, made_by: object | None = None) -> None:
         """Adds an entry; the same code may register it again, as a notebook cell run twice does.
 
-        Args:
-            name: Letters, digits, hyphens and underscores.
-            entry: The entry.
-            made_by: The class or function that identifies the entry's origin; by default the entry
-                itself, or its class.
+        Its origin is the class or function `made_by`, by default the entry itself or its class.
 
         Raises:
             LicError: The name is invalid, or taken by other code.

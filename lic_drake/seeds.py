@@ -20,8 +20,8 @@ def make_generator(stream: str, purpose: str, *indices: int) -> np.random.Genera
     Args:
         stream: One of `STREAMS`.
         purpose: What is sampled, such as a clutter category or "goal".
-        indices: Integers from 0 to 2^32 - 1, such as the environment's index; always equally many
-            for a purpose, because NumPy treats (5,) and (5, 0) as equal.
+        indices: Integers from 0 to 2^32 - 1; always equally many for a purpose, because NumPy
+            treats (5,) and (5, 0) as equal.
 
     Raises:
         RequestError: The stream is unknown or an index is out of range.

@@ -14,9 +14,7 @@ IntVector = NDArray[np.intp]
 def check_shapes(arrays: object, **shapes: tuple[int | None, ...]) -> None:
     """Checks the shapes of an object's array attributes; None is always valid.
 
-    Args:
-        arrays: The object.
-        shapes: Expected shape of each attribute; a length of None matches any.
+    A length of None matches any.
 
     Raises:
         ValueError: A shape is wrong.

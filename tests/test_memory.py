@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.five_joint_arm import NAME
 from support.reaches import free_space, reach_request, small_clutter
 from support.worlds import box, cylinder, make_clutter
 
@@ -100,20 +99,6 @@ def test_reaches_of_the_pr2_leave_nothing(built: list["weakref.ref[Any]"]) -> No
     assert len(built) >= len(ONE_DIAGRAM)
     session.clear()
     assert alive(built) == []
-
-
-def test_an_arm_with_a_plant_of_its_own_for_its_kinematics_keeps_no_diagram(
-    built: list["weakref.ref[Any]"],
-) -> None:
-    scenario = load_scenario(
-        "sphere-aperture-clutter", f"{{robot: {NAME}, task: {{torso_m: 0.8}}}}"
-    )
-    arm = scenario.arm()
-    x0 = arm.tip_pose(np.array([0.3, -0.5, 1.0, -0.5, 0.2])) + np.pad([0.8], (2, 4))
-    scenario.stop.timeout_s = 0.2
-    Environment(scenario, make_clutter()).reach(x0[:3] - [0.1, 0.0, 0.0], x0)
-    assert alive(built) == []
-    assert len(built) == len(ONE_DIAGRAM)
 
 
 def test_failures_and_invalid_starts_leave_nothing(

@@ -1,8 +1,9 @@
 """`LicProgram`: the optimisation of paper Eqs. (3) and (4), an ordinary MathematicalProgram."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any
+from weakref import WeakMethod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,6 @@ from lic_drake.select.objective import SuccessObjective
 from lic_drake.select.situation import Situation
 from lic_drake.starts import Region
 from lic_drake.types import BoolVector, Vector
-from lic_drake.weak_method import weakly
 
 CLEARANCE_M = 0.001
 """The arm keeps this far from board and body, metres."""
@@ -50,6 +50,22 @@ _NLOPT: dict[str, float] = {
     NloptSolver.ConstraintToleranceName(): 1e-9,
 }
 _SNOPT: dict[str, float] = {"Major iterations limit": 50}
+
+
+def weakly[**P, R](method: Callable[P, R]) -> Callable[P, R]:
+    """Wraps a bound method so that the wrapper holds only a weak reference to its object.
+
+    Callbacks that Drake 1.58 holds in C++ are invisible to Python's garbage collector: an object
+    whose own method is among them would never be freed, nor would the diagrams it refers to.
+    """
+    weak = WeakMethod(method)
+
+    def call(*args: P.args, **kwargs: P.kwargs) -> R:
+        bound = weak()
+        assert bound is not None
+        return bound(*args, **kwargs)
+
+    return call
 
 
 class LicProgram(MathematicalProgram):

@@ -9,10 +9,9 @@ from support.select_surfaces import random_model
 from lic_drake.estimate.features import features_of
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.select.objective import Objective
-from lic_drake.select.program import LicProgram
+from lic_drake.select.program import LicProgram, weakly
 from lic_drake.select.situation import Situation
 from lic_drake.starts import make_starts
-from lic_drake.weak_method import weakly
 
 
 class Owner:
