@@ -70,7 +70,7 @@ def read_mapping(text: str | bytes, source: str) -> dict[str, Any]:
     """Parses a YAML mapping safely; empty text is an empty mapping.
 
     Raises:
-        ScenarioError: The text, from `source`, is longer than `MAX_YAML_BYTES` or not a YAML mapping.
+        ScenarioError: It is longer than `MAX_YAML_BYTES` or not a mapping; names the `source`.
     """
     if len(text) > MAX_YAML_BYTES:
         raise ScenarioError(f"{source}: YAML of {len(text)} bytes; at most {MAX_YAML_BYTES}")
