@@ -143,16 +143,6 @@ def test_without_dask_a_scheduler_is_refused_with_the_way_to_install_it(
     assert 'install it with: pip install "lic_drake[cluster]"\n' in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("workers", ["0", "1.5"])
-def test_a_number_of_workers_must_be_positive(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], workers: str
-) -> None:
-    with pytest.raises(SystemExit) as end:
-        main(["collect", str(tmp_path), "--workers", workers])
-    assert end.value.code == 2
-    assert f"needs a whole number of 1 or more, got '{workers}'" in capsys.readouterr().err
-
-
 def test_a_real_reach_is_collected_with_a_progress_bar_on_a_terminal(tmp_path: Path) -> None:
     terminal, child_side = pty.openpty()
     termios.tcsetwinsize(terminal, (24, 120))

@@ -110,27 +110,6 @@ def test_a_mistake_is_one_line_and_exit_code_2(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_start_in_the_clutter_is_a_mistake(capsys: pytest.CaptureFixture[str]) -> None:
-    crowded = (
-        "{clutter: {num_movable: 0, num_fixed: 1, lower: [0.33, -0.005], upper: [0.34, 0.005]}}"
-    )
-    assert main(["reach", "--set", crowded]) == 2
-    assert "the arm touches the clutter at its start" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [["--goal", "a", "b"], ["--environment", "1.5"], ["--environment", "-1"], ["--set"]],
-)
-def test_what_argparse_refuses_has_exit_code_2(
-    capsys: pytest.CaptureFixture[str], arguments: list[str]
-) -> None:
-    with pytest.raises(SystemExit) as end:
-        main([*LIC_REACH, *arguments])
-    assert end.value.code == 2
-    assert "lic reach: error: " in capsys.readouterr().err
-
-
 def test_a_reach_that_fails_in_the_simulator_is_reported_not_raised(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
