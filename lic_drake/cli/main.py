@@ -15,11 +15,7 @@ SUBCOMMANDS = (demo, reach, select, collect, experience, evaluate)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Runs the command line and returns the exit code.
-
-    Args:
-        argv: Arguments without the program name; those of the process by default.
-    """
+    """Runs arguments, by default those of the process, and returns the exit code."""
     args, unknown = make_parser().parse_known_args(argv)
     if unknown:  # Reported with the usage of the subcommand.
         args.parser.error(f"unrecognized arguments: {' '.join(unknown)}")

@@ -17,11 +17,7 @@ from lic_drake.types import Vector
 
 
 def read_goal(scenario: Scenario, numbers: Sequence[float]) -> Vector:
-    """Returns the goal given by --goal, shape (3,), metres.
-
-    Raises:
-        RequestError: The number of coordinates is wrong.
-    """
+    """Returns the goal given by --goal, shape (3,), metres."""
     size = 2 if scenario.arm().is_planar else 3
     if len(numbers) != size:
         raise RequestError(
@@ -32,11 +28,7 @@ def read_goal(scenario: Scenario, numbers: Sequence[float]) -> Vector:
 
 
 def make_request(scenario: Scenario, args: argparse.Namespace) -> ReachRequest:
-    """Returns the request of the arguments of `lic reach`.
-
-    Raises:
-        RequestError: Goal or start are impossible, or options are for another kind of robot.
-    """
+    """Returns the request of the arguments of `lic reach`."""
     planar = scenario.arm().is_planar
     for name in ("base_y", "torso", "aperture") if planar else ("start_y", "start_phi"):
         if getattr(args, name) is not None:
@@ -84,11 +76,7 @@ def _start_in_aperture(scenario: Scenario, p_WG: Vector, args: argparse.Namespac
 
 
 def read_failure(starts: FeasibleStarts, text: str) -> FailedReach:
-    """Reads a failed attempt from YAML or JSON, given in place or as a file.
-
-    Raises:
-        LicError: It cannot be read, has an unknown name, or does not state where it began.
-    """
+    """Reads a failed attempt from YAML or JSON, given in place or as a file."""
     if not text.lstrip().startswith("{"):
         try:
             text = Path(text).read_text(encoding="utf-8")
