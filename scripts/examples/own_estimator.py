@@ -8,11 +8,11 @@ from sklearn.ensemble import RandomForestClassifier
 import lic_drake as lic
 
 lic.register_estimator(
-    "forest", lambda features: lic.from_sklearn(RandomForestClassifier(random_state=0))
+    "forest", lambda features: lic.from_sklearn(RandomForestClassifier(50, random_state=0))
 )
 
 scenario = lic.load_scenario("cylinder-clutter")
-request = lic.CollectionRequest(scenario=scenario, environments=3, max_goals=4, max_starts=5)
+request = lic.CollectionRequest(scenario=scenario, environments=3, max_goals=3, max_starts=4)
 library = lic.ExperienceLibrary(Path("small_library"))
 lic.collect(library, request)  # Interrupted, it goes on where it was.
 print(f"{library.num_reaches} reaches, {library.columns()['success'].mean():.0%} succeeded")
