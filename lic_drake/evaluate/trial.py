@@ -16,13 +16,12 @@ import numpy as np
 from lic_drake.evaluate.trials import TrialRow, read_trials, write_trials
 from lic_drake.experience.pairs import pair_second_attempts
 from lic_drake.experience.runner import Task, refuse_failed, run_tasks, shard_name
-from lic_drake.experience.schema import scenario_text
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.experience.workers import Workers
 from lic_drake.perception.config import CamerasConfig, load_cameras
 from lic_drake.perception.observer import Observer
 from lic_drake.reach.request import ReachRecord, ReachRequest
-from lic_drake.reach.scenario import Scenario, load_scenario, parse_scenario
+from lic_drake.reach.scenario import Scenario, load_scenario
 from lic_drake.reach.session import run_reach
 from lic_drake.seeds import make_generator
 from lic_drake.select.baselines import RandomSelector
@@ -161,10 +160,7 @@ class Evaluation:
         """Returns the evaluated scenario."""
         if self.scenario_name:
             return load_scenario(self.scenario_name, self.overrides)
-        scenario = ExperienceLibrary(self.experience).scenario()
-        if not self.overrides:
-            return scenario
-        return parse_scenario(scenario_text(scenario), self.overrides, source="--set")
+        return ExperienceLibrary(self.experience).scenario(self.overrides)
 
 
 def run_evaluation(

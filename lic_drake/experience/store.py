@@ -81,10 +81,15 @@ class ExperienceLibrary:
             found.update(zip(*(column.to_pylist() for column in table.columns), strict=True))
         return found
 
-    def scenario(self) -> Scenario:
-        """Returns the scenario of the reaches; raises a ScenarioError if it is unknown here."""
+    def scenario(self, overrides: str = "") -> Scenario:
+        """Returns the scenario of the reaches, with values of YAML text put over it.
+
+        Raises:
+            ScenarioError: It is unknown here, or the text has an unknown or invalid value.
+        """
         header = self._read([])[0]
-        return parse_same_scenario(header["scenario"], header["scenario_digest"], self.path)
+        stored = parse_same_scenario(header["scenario"], header["scenario_digest"], self.path)
+        return parse_scenario(header["scenario"], overrides, "--set") if overrides else stored
 
     def check_scenario(self, scenario: Scenario, owner: str) -> None:
         """Raises a LibraryError if the library holds reaches of another scenario."""

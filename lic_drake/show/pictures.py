@@ -10,7 +10,6 @@ from lic_drake.perception.observer import Observer
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.select.lic import LicSelector
 from lic_drake.show.apertures import apertures_figure
-from lic_drake.show.approach import Approach
 from lic_drake.show.density import densities_figure
 from lic_drake.show.detections import look_figure, maps_figure
 from lic_drake.show.figures import ShownTrial, save_figure
@@ -91,11 +90,11 @@ def save_pictures(
 def record_trial(trial: ShownTrial, drake_models: Path | None = None) -> Recording:
     """Returns a recording of all attempts; a PR2 moves base, torso and arm to each start."""
     scenario, instance = trial.scenario, trial.instance
-    approach = None if scenario.arm().is_planar else Approach(scenario, instance)
+    approach = not scenario.arm().is_planar
     recording = Recording(scenario, instance, drake_models, approach)
     before: ReachTrace | None = None
     for trace in trial.traces:
-        if approach is not None and trace.q:
+        if approach and trace.q:
             if before is not None:
                 recording.retract(before)
             recording.move_to(trace.b0, trace.q[0])

@@ -64,7 +64,7 @@ class Recording:
         scenario: Scenario,
         instance: ClutterInstance,
         drake_models: Path | None = None,
-        approach: Approach | None = None,
+        approach: bool = False,
     ) -> None:
         """Starts a recording.
 
@@ -72,10 +72,11 @@ class Recording:
             scenario: Robot, task and control rate.
             instance: The environment.
             drake_models: Folder of package://drake_models, to show a PR2 in its meshes.
-            approach: How the arm moves between its waiting posture and its starts; the recording
-                begins in that posture. By default it moves on straight lines.
+            approach: Whether a PR2's arm begins in its waiting posture and moves to its starts on
+                planned paths; otherwise it moves straight in joint space.
         """
-        self._scenario, self._approach = scenario, approach
+        self._scenario = scenario
+        self._approach = Approach(scenario, instance) if approach else None
         self._meshcat = _make_meshcat()
         builder = DiagramBuilder()
         self._scene = scene = add_stage(builder, scenario, instance, drake_models)
@@ -90,9 +91,9 @@ class Recording:
         self._clock_s = 0.0
         self._b0 = scenario.task.b0
         initial = scene.plant.GetDefaultPositions(scene.arm)[3:]
-        self._q: Vector = initial if approach is None else approach.waiting
+        self._q: Vector = initial if self._approach is None else self._approach.waiting
         self._set_up_view()
-        if approach is not None:
+        if approach:
             self._draw()
 
     def add_reach(self, trace: ReachTrace, p_WG: Vector) -> None:

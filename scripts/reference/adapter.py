@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from lic_drake.experience.schema import scenario_text
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 from lic_drake.reach.request import ReachRequest
-from lic_drake.reach.scenario import Scenario, parse_scenario
+from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.session import run_reach
 from lic_drake.reach.start import POSE_AXES, Start
 from lic_drake.seeds import make_generator
@@ -48,8 +47,7 @@ def simulate(category: str, row: dict[str, Any]) -> dict[str, Any]:
 
 @cache
 def _scenario(category: str) -> Scenario:
-    text = scenario_text(_library(category).scenario())
-    return parse_scenario(text, OVERRIDES.get(category, ""), source=category)
+    return _library(category).scenario(OVERRIDES.get(category, ""))
 
 
 @cache

@@ -15,11 +15,10 @@ from lic_drake.evaluate.statistics import Count, count, mcnemar
 from lic_drake.evaluate.table import Table, rate_cells
 from lic_drake.evaluate.trial import Attempt, run_trial
 from lic_drake.evaluate.trials import TrialRow, TrialTable, write_trials
-from lic_drake.experience.schema import scenario_text
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 from lic_drake.reach.request import ReachRecord, ReachRequest
-from lic_drake.reach.scenario import Scenario, parse_scenario
+from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.session import run_reach
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.registry import Selector, make_selector
@@ -52,7 +51,7 @@ Beliefs = dict[str, dict[str, list[float]]]
 
 def common_scenario(library: ExperienceLibrary) -> Scenario:
     """Returns the scenario of a library with the starts that both categories share."""
-    return parse_scenario(scenario_text(library.scenario()), COMMON_STARTS)
+    return library.scenario(COMMON_STARTS)
 
 
 def make_strategies(

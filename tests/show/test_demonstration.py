@@ -13,13 +13,12 @@ from support.made_up import planar_library, small_cameras, sphere_library
 from support.mesh_package import write_drake_models
 
 from lic_drake.errors import LicError, RequestError
-from lic_drake.experience.schema import scenario_text
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 from lic_drake.perception.config import load_cameras
 from lic_drake.perception.observer import Observer
 from lic_drake.reach.request import ReachRequest
-from lic_drake.reach.scenario import load_scenario, parse_scenario
+from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.session import run_reach
 from lic_drake.reach.start import Start
 from lic_drake.show.demonstration import demonstrate
@@ -100,7 +99,7 @@ def test_a_second_attempt_starts_elsewhere_and_the_pictures_are_the_new_ones_onl
 def test_a_pr2_shows_what_it_did_in_drakes_meshes(
     spheres: ExperienceLibrary, tmp_path: Path
 ) -> None:
-    scenario = parse_scenario(scenario_text(spheres.scenario()), "{clutter: {num_blocked: 8}}")
+    scenario = spheres.scenario("{clutter: {num_blocked: 8}}")
     lines: list[str] = []
     package = write_drake_models(tmp_path / "package")
     result = demonstrate(

@@ -96,7 +96,7 @@ def test_the_robot_moves_base_torso_and_arm_in_that_order_and_the_arm_goes_back(
     result = environment.reach(p_WG, x0, keep_states=True)
     assert result.outcome == "timeout"
 
-    recording = Recording(scenario, instance, approach=Approach(scenario, instance))
+    recording = Recording(scenario, instance, approach=True)
     recording.move_to(b0, q)
     recording.add_reach(result.trace, p_WG)
     recording.retract(result.trace)

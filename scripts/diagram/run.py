@@ -1,4 +1,7 @@
-"""Draws the systems of a diagram and their connections, without Graphviz."""
+"""Draws the systems of a diagram and their connections, without Graphviz.
+
+python scripts/diagram/run.py reach.svg --scenario cylinder-clutter
+"""
 
 from pathlib import Path
 
@@ -6,7 +9,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 from pydrake.systems.framework import Diagram
 
+from lic_drake.reach.diagram import make_reach_diagram
+from lic_drake.reach.scenario import load_scenario
 from lic_drake.show.figures import save_figure
+from scripts.common import make_parser, run_script
 
 type Edge = tuple[str, str, str, str]
 """A connection: from system, its output port, to system, its input port."""
@@ -98,3 +104,18 @@ def _columns(edges: list[Edge]) -> list[list[str]]:
                 depth[sink] = min(max(depth[sink], depth[source] + 1), len(names))
     levels = sorted(set(depth.values()))
     return [[name for name in names if depth[name] == level] for level in levels]
+
+
+def main() -> None:
+    """Draws the reach diagram of a scenario's first training environment."""
+    parser = make_parser(__doc__)
+    parser.add_argument("path", type=Path)
+    parser.add_argument("--scenario", default="cylinder-clutter")
+    args = parser.parse_args()
+    scenario = load_scenario(args.scenario)
+    instance = scenario.sample_instance("training", 0)
+    draw_diagram(make_reach_diagram(scenario, instance).diagram, args.path)
+
+
+if __name__ == "__main__":
+    run_script(main)

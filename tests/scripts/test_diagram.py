@@ -7,7 +7,7 @@ from support.worlds import cylinder, make_clutter
 
 from lic_drake.reach.diagram import make_reach_diagram
 from lic_drake.reach.scenario import load_scenario
-from lic_drake.show.diagram_drawing import draw_diagram, list_connections
+from scripts.diagram.run import draw_diagram, list_connections
 
 
 @pytest.fixture(scope="module")
