@@ -10,6 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from lic_drake.clutter.registry import category_names as category_names
     from lic_drake.clutter.registry import register_category as register_category
     from lic_drake.errors import LicError as LicError
     from lic_drake.estimate.estimator import SuccessEstimator as SuccessEstimator
@@ -32,13 +33,20 @@ if TYPE_CHECKING:
     from lic_drake.reach.session import run_reach as run_reach
     from lic_drake.reach.session import simulate_request as simulate_request
     from lic_drake.reach.start import Start as Start
+    from lic_drake.reach.start import Starts as Starts
     from lic_drake.robots.arm import Arm as Arm
     from lic_drake.robots.registry import register_robot as register_robot
     from lic_drake.select.program import LicProgram as LicProgram
     from lic_drake.select.registry import make_selector as make_selector
     from lic_drake.select.situation import FailedReach as FailedReach
     from lic_drake.select.situation import Situation as Situation
+    from lic_drake.show.apertures import draw_aperture_map as draw_aperture_map
+    from lic_drake.show.apertures import estimate_apertures as estimate_apertures
+    from lic_drake.show.density import densities_figure as densities_figure
     from lic_drake.show.recording import Recording as Recording
+    from lic_drake.show.views import draw_snapshot as draw_snapshot
+    from lic_drake.show.views import draw_view as draw_view
+    from lic_drake.show.views import snapshots_figure as snapshots_figure
     from lic_drake.starts import make_starts as make_starts
 
 __version__ = "0.1.0"
@@ -57,8 +65,15 @@ _HOMES = {
     "Scenario": "reach.scenario",
     "Situation": "select.situation",
     "Start": "reach.start",
+    "Starts": "reach.start",
     "SuccessEstimator": "estimate.estimator",
+    "category_names": "clutter.registry",
     "collect": "experience.collect",
+    "densities_figure": "show.density",
+    "draw_aperture_map": "show.apertures",
+    "draw_snapshot": "show.views",
+    "draw_view": "show.views",
+    "estimate_apertures": "show.apertures",
     "from_sklearn": "estimate.estimator",
     "instance_of": "reach.session",
     "load_scenario": "reach.scenario",
@@ -74,6 +89,7 @@ _HOMES = {
     "shipped_library": "paths",
     "simulate": "experience.runner",
     "simulate_request": "reach.session",
+    "snapshots_figure": "show.views",
 }
 
 __all__ = ["__version__", *_HOMES]

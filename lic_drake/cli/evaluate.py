@@ -64,7 +64,8 @@ def add_parser(subparsers: Subparsers) -> None:
         "--variant",
         default="",
         metavar="NAME",
-        help="label that keeps these trials apart from others in the folder (default: none)",
+        help="label that keeps these trials apart from others in the folder (default: those of"
+        " fresh, still and cameras that are given)",
     )
     bench = add_command(
         subparsers,
@@ -86,6 +87,8 @@ def run(args: argparse.Namespace) -> int:
     from lic_drake.evaluate.trials import TrialTable
     from lic_drake.paths import shipped_library
 
+    given = (name for name in ("fresh", "still", "cameras") if getattr(args, name))
+    variant = args.variant or "-".join(given)
     evaluation = Evaluation(
         experience=args.library or shipped_library(DEFAULT_SCENARIO),
         results=args.results,
@@ -97,7 +100,7 @@ def run(args: argparse.Namespace) -> int:
         common_goals=args.common_goals,
         second_attempts=args.second_attempts,
         fresh=args.fresh,
-        variant=args.variant,
+        variant=variant,
         overrides=args.set,
         moves=not args.still,
         scenario_name=args.scenario,
@@ -105,7 +108,7 @@ def run(args: argparse.Namespace) -> int:
     )
     with workers_of(args) as workers:
         rows = run_evaluation(evaluation, workers, say=remark)
-    rates = summarize_trials(TrialTable(rows), args.attempts, args.variant)
+    rates = summarize_trials(TrialTable(rows), args.attempts, variant)
     values = {"trials": str(evaluation.trials_path), "rates": rates}
     print_result(args, values, format_rates(rates).rstrip("\n"))
     return 0

@@ -48,33 +48,20 @@ def add_parser(subparsers: Subparsers) -> None:
         metavar="FILE.html",
         help="write a recording that plays offline (default: none)",
     )
-    parser.add_argument(
-        "--diagram",
-        type=Path,
-        metavar="FILE.svg",
-        help="draw the Drake diagram as .svg, .png or .pdf (default: none)",
-    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Simulates the reach and prints its record."""
     from lic_drake.cli.requests import make_request
-    from lic_drake.reach.diagram import make_reach_diagram
     from lic_drake.reach.scenario import load_scenario
     from lic_drake.reach.session import instance_of, run_reach, simulate_request
     from lic_drake.reach.start import describe_start
-    from lic_drake.show.diagram_drawing import draw_diagram
-    from lic_drake.show.recording import Recording
 
     args.stream = args.stream or "evaluation"
     scenario = load_scenario(args.scenario or DEFAULT_SCENARIO, args.set)
     request = make_request(scenario, args)
-    instance = instance_of(request)
-    for path in (args.diagram, args.record):
-        if path is not None:
-            check_writable(path.parent)
-    if args.diagram is not None:
-        draw_diagram(make_reach_diagram(scenario, instance).diagram, args.diagram)
+    if args.record is not None:
+        check_writable(args.record.parent)
     record = run_reach(request)
     if record.outcome == "invalid_start":
         raise RequestError(
@@ -82,7 +69,9 @@ def run(args: argparse.Namespace) -> int:
             " a possible start"
         )
     if args.record is not None:
-        recording = Recording(scenario, instance)
+        from lic_drake.show.recording import Recording
+
+        recording = Recording(scenario, instance_of(request))
         recording.add_reach(simulate_request(request, keep_states=True).trace, request.goal)
         recording.save(args.record)
     values = dataclasses.asdict(record)

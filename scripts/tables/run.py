@@ -16,6 +16,9 @@ from lic_drake.evaluate.paper import (
     success_table,
     t_test_table,
 )
+from lic_drake.evaluate.paper import (
+    REMARKS as REMARKS,
+)
 from lic_drake.evaluate.statistics import count, mcnemar
 from lic_drake.evaluate.table import Table, rate_cells
 from lic_drake.evaluate.trials import TrialTable

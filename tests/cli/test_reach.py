@@ -4,7 +4,6 @@ import subprocess
 import sys
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import pytest
 
@@ -54,15 +53,12 @@ def test_the_text_says_how_it_ended(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().out.startswith("reached after ")
 
 
-def test_a_diagram_and_a_recording_are_written(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    svg, html = tmp_path / "reach.svg", tmp_path / "reach.html"
+def test_a_recording_is_written(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    html = tmp_path / "reach.html"
     plain = run_json(capsys)
-    shown = run_json(capsys, "--diagram", str(svg), "--record", str(html))
+    shown = run_json(capsys, "--record", str(html))
     del plain["wall_time_s"], shown["wall_time_s"]
     assert shown == plain
-    assert ElementTree.parse(svg).getroot().tag.endswith("svg")
     content = html.read_text(encoding="utf-8")
     assert content.lstrip().lower().startswith("<!doctype html")
     assert len(content) > 1_000_000
@@ -92,7 +88,6 @@ def test_a_recording_leaves_the_output_to_the_command(tmp_path: Path) -> None:
         (["--set", "{mpc: {preset: best}}"], "unknown mpc preset 'best'"),
         (["--stream", "test"], "unknown seed stream 'test'; choose one of training, evaluation"),
         (["--environment", "4294967296"], "seed indices must be from 0 to 2^32 - 1, got"),
-        (["--diagram", "{tmp}/a.docx"], "cannot write {tmp}/a.docx: "),
         (["--record", "{tmp}"], "cannot write {tmp}: "),
         (["--record", "{tmp}/a.html", "--start-y", "9"], "cannot start at y +9.000 m"),
     ],

@@ -14,7 +14,6 @@ from lic_drake.errors import LicError
 from lic_drake.reach.environment import Environment
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.trace import ReachTrace
-from lic_drake.show.approach import Approach
 from lic_drake.show.recording import MOVE_S, PAUSE_S, Recording, frame_rate
 from lic_drake.starts import board_starts
 
