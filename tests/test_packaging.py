@@ -86,6 +86,10 @@ def test_pages_link_to_files_that_exist() -> None:
     for page in pages:
         for link in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
             assert (page.parent / link).exists(), f"{page}: {link}"
+    architecture = (CHECKOUT / "lic_drake" / "README.md").read_text(encoding="utf-8")
+    files = {path.name for path in CHECKOUT.rglob("*.py")} | {"paper.yaml", "pyproject.toml"}
+    named = re.findall(r"`(?:[\w/]+/)?(\w+\.(?:py|yaml))`", architecture)
+    assert set(named) <= files
 
 
 def test_no_file_in_models_is_ignored_by_git(tmp_path: Path) -> None:

@@ -62,6 +62,8 @@ def run(args: argparse.Namespace) -> int:
     request = make_request(scenario, args)
     if args.record is not None:
         check_writable(args.record.parent)
+        if args.record.is_dir():
+            raise RequestError(f"cannot write {args.record}: it is a folder; name a file in it")
     record = run_reach(request)
     if record.outcome == "invalid_start":
         raise RequestError(

@@ -1,16 +1,16 @@
-"""The board with square apertures, and sphere-aperture-clutter behind it (paper IV-B, V-B)."""
+"""The board with square apertures, before spheres and foliage (paper IV-B, V-B)."""
 
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from lic_drake.clutter.instance import ClutterInstance, join, make_objects, place_discs
+from lic_drake.clutter.instance import ClutterInstance, join, make_objects
 from lic_drake.config import check_numbers
 from lic_drake.errors import ScenarioError
 from lic_drake.types import IntVector, Vector
 
-# Maximum number of rows or columns of a board, and of spheres: more are too slow to simulate.
-_MAX_APERTURES, _MAX_SPHERES = 20, 1000
+_MAX_APERTURES = 20
+"""Maximum number of rows or columns; more are too slow to simulate."""
 
 
 @dataclass(kw_only=True)
@@ -72,43 +72,3 @@ class ApertureBoard:
         edges = [self.bar_m, self.aperture_m, self.aperture_m]
         covers = make_objects("box", edges, p_WA[blocked])
         return join(self.bare_board(), covers, p_WA=np.delete(p_WA, blocked, axis=0))
-
-
-@dataclass(kw_only=True)
-class SphereApertureClutter(ApertureBoard):
-    """sphere-aperture-clutter: floating spheres behind a board (paper IV-B).
-
-    Number, radius, mass, box and apertures are the paper's. It does not state their distance from
-    the robot: `models/scenarios/sphere-aperture-clutter.yaml` says how that was chosen.
-    """
-
-    num_spheres: int = 40
-    radius_m: float = 0.05
-    mass_kg: float = 0.1
-    # Box for the spheres' centres, (x, y, z) in W, metres.
-    lower: list[float] = field(default_factory=lambda: [0.59, -0.64, 0.69])
-    upper: list[float] = field(default_factory=lambda: [0.78, 0.06, 1.09])
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_numbers(
-            self,
-            positive=["radius_m", "mass_kg"],
-            ranges={"num_spheres": (0, _MAX_SPHERES)},
-            vectors={"lower": 3, "upper": 3},
-            ascending=[("lower", "upper")],
-        )
-        if self.lower[0] - self.radius_m < self.board_back_m:
-            raise ScenarioError(
-                f"spheres from x = {self.lower[0] - self.radius_m:.3f} m would overlap the board at"
-                f" {self.board_centre[0]} m; raise lower or move board_centre"
-            )
-
-    def sample(self, rng: np.random.Generator) -> ClutterInstance:
-        """Samples an environment; its spheres do not depend on `num_blocked`."""
-        n = self.num_spheres
-        centres = place_discs(rng, n, self.lower, self.upper, 2.0 * self.radius_m)
-        spheres = make_objects("sphere", [self.radius_m], centres, mass=self.mass_kg, movable=True)
-        order = rng.permutation(self.rows * self.columns)
-        board = self.blocked_board(np.sort(order[: self.num_blocked]))
-        return join(spheres, board, p_WA=board.p_WA)

@@ -5,11 +5,11 @@ from typing import Protocol
 
 import numpy as np
 
-from lic_drake.clutter.board import SphereApertureClutter
 from lic_drake.clutter.cylinder import CylinderApertureClutter, CylinderClutter
 from lic_drake.clutter.foliage import FoliageApertureClutter
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.clutter.passage import PassageClutter
+from lic_drake.clutter.sphere import SphereApertureClutter
 from lic_drake.errors import ScenarioError
 from lic_drake.registry import Registry
 

@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.distance import pdist
 
-from lic_drake.clutter.board import ApertureBoard, SphereApertureClutter
+from lic_drake.clutter.board import ApertureBoard
 from lic_drake.clutter.instance import ClutterInstance
+from lic_drake.clutter.sphere import SphereApertureClutter
 from lic_drake.errors import ScenarioError
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.seeds import make_generator
