@@ -12,7 +12,7 @@ from lic_drake.paths import models_dir
 
 @dataclass(kw_only=True)
 class NoiseConfig:
-    """Errors of a depth camera's images; see `lic_drake.perception.noise`."""
+    """Errors of a depth camera's images; see `lic_drake.perception.image`."""
 
     # Standard deviation of a depth z, and the step in which depths come, are these times z^2, 1/m.
     depth_sigma_per_m: float = 1.425e-3

@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 from pydrake.geometry import TriangleSurfaceMesh, VolumeMesh
 from pydrake.multibody.plant import CalcContactFrictionFromSurfaceProperties, ContactResults
-from pydrake.systems.analysis import ApplySimulatorConfig, SimulatorConfig
 from support.worlds import ARM, World, box, cylinder, gap_to_boxes, make_clutter, make_world
 
 from lic_drake.clutter.instance import ClutterInstance
@@ -16,8 +15,8 @@ def contact_results(world: World) -> ContactResults:
     return world.scene.plant.get_contact_results_output_port().Eval(world.plant_context)
 
 
-@pytest.mark.parametrize("mu", [0.0, 0.2, 0.5])
-def test_friction_of_arm_on_object_is_twice_that_of_object_on_object(mu: float) -> None:
+def test_friction_of_arm_on_object_is_twice_that_of_object_on_object() -> None:
+    mu = 0.3
     config = ContactConfig(object_friction=mu)
     skin, item = skin_properties(config), object_properties(config)
     for first, second, expected in ((item, item, mu), (skin, item, 2.0 * mu)):
@@ -25,12 +24,12 @@ def test_friction_of_arm_on_object_is_twice_that_of_object_on_object(mu: float) 
             first.GetProperty("material", "coulomb_friction"),
             second.GetProperty("material", "coulomb_friction"),
         )
-        assert combined.static_friction() == pytest.approx(expected, abs=1e-6)
+        assert combined.static_friction() == combined.dynamic_friction()
         assert combined.dynamic_friction() == pytest.approx(expected, abs=1e-6)
 
 
 def test_every_geometry_of_the_arm_is_compliant_and_every_object_is_rigid() -> None:
-    config = SceneConfig(contact=ContactConfig(skin_modulus_Pa=2e7, dissipation_s_per_m=0.5))
+    config = SceneConfig(contact=ContactConfig(skin_modulus_Pa=2e7))
     clutter = make_clutter(
         cylinder(0.6, 0.0), cylinder(0.7, 0.0, movable=True), box(0.5, 0.5, (0.1, 0.1, 0.1))
     )
@@ -52,8 +51,6 @@ def test_every_geometry_of_the_arm_is_compliant_and_every_object_is_rigid() -> N
         assert properties.GetProperty("hydroelastic", "hydroelastic_modulus") == 2e7
     for geometry in objects:
         assert isinstance(inspector.maybe_get_hydroelastic_mesh(geometry), TriangleSurfaceMesh)
-        properties = inspector.GetProximityProperties(geometry)
-        assert properties.GetProperty("material", "hunt_crossley_dissipation") == 0.5
 
 
 def test_friction_of_the_sliding_arm_on_a_fixed_object_is_measured_as_0_4() -> None:
@@ -125,8 +122,7 @@ def test_a_tip_on_a_wall_is_about_as_stiff_as_the_authors_contact_spring() -> No
     assert (force[1] - force[0]) / 1.0e-4 == pytest.approx(4.8e4, rel=0.5)
 
 
-@pytest.mark.parametrize("time_step", [0.0, 0.005])
-@pytest.mark.parametrize("speed", [0.0, 1.0])
+@pytest.mark.parametrize(("speed", "time_step"), [(0.0, 0.0), (1.0, 0.0), (1.0, 0.005)])
 def test_a_thin_wall_stops_the_arm_and_bears_what_the_joints_press_with(
     speed: float, time_step: float
 ) -> None:
@@ -134,11 +130,6 @@ def test_a_thin_wall_stops_the_arm_and_bears_what_the_joints_press_with(
     along = -ARM.calc_pose(BENT)[:2][0][2, :, 1]
     clutter = make_clutter(wall_ahead(0.02))
     world = make_world(BENT, clutter, SceneConfig(time_step_s=time_step))
-    if time_step == 0.0:
-        ApplySimulatorConfig(
-            SimulatorConfig(integration_scheme="cenic", accuracy=1e-4, max_step_size=0.01),
-            world.simulator,
-        )
     to_joints = np.linalg.pinv(ARM.calc_pose(BENT).Jv_E) @ along
     q_d = BENT + 0.1 * to_joints
     world.set_equilibrium(q_d)

@@ -14,7 +14,6 @@ MASS = np.array([2.835, 2.3, 1.32])
 INERTIA = np.array([0.011214, 0.024175, 0.009533])
 COM = np.array([0.098, 0.167, 0.1365])
 LENGTH = np.array([0.196, 0.334])
-TIME_STEPS = [0.0005, 0.005]
 
 
 def mass_matrix_and_bias(q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -34,11 +33,11 @@ def mass_matrix_and_bias(q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.n
     return M, bias
 
 
-@pytest.mark.parametrize(("force", "time_step"), [((3.0, -2.0), 0.001), ((-4.0, 1.0), 0.005)])
+@pytest.mark.parametrize("force", [(3.0, -2.0), (-4.0, 1.0)])
 def test_a_force_on_the_tip_deflects_the_arm_by_the_joint_compliance(
-    force: tuple[float, float], time_step: float
+    force: tuple[float, float],
 ) -> None:
-    world = make_world(Q0, make_clutter(), SceneConfig(time_step_s=time_step))
+    world = make_world(Q0, make_clutter(), SceneConfig(time_step_s=0.005))
     f_E_W = np.append(force, 0.0)
     world.push("link3", np.array([0.0, -0.288, 0.0]), f_E_W)
     world.advance(8.0)
@@ -50,7 +49,7 @@ def test_a_force_on_the_tip_deflects_the_arm_by_the_joint_compliance(
     np.testing.assert_allclose(world.q, Q0, atol=1e-6)
 
 
-@pytest.mark.parametrize("time_step", TIME_STEPS)
+@pytest.mark.parametrize("time_step", [0.001, 0.005])
 def test_the_step_response_agrees_with_an_integration_of_the_equations_of_motion(
     time_step: float,
 ) -> None:
@@ -62,22 +61,11 @@ def test_the_step_response_agrees_with_an_integration_of_the_equations_of_motion
         return np.append(v, np.linalg.solve(M, K * (q_d - q) - D * v - bias))
 
     times = np.array([0.02, 0.1, 0.3, 1.0, 3.0])
-    reference = (
-        solve_ivp(
-            derivative,
-            (0.0, 3.0),
-            np.append(Q0, np.zeros(3)),
-            "LSODA",
-            times,
-            rtol=1e-9,
-            atol=1e-11,
-        )
-        .y[:3]
-        .T
-    )
+    first = np.append(Q0, np.zeros(3))
+    solution = solve_ivp(derivative, (0.0, 3.0), first, "LSODA", times, rtol=1e-9, atol=1e-11)
     world = make_world(Q0, make_clutter(), SceneConfig(time_step_s=time_step))
     world.set_equilibrium(q_d)
-    for time, expected in zip(times, reference, strict=True):
+    for time, expected in zip(times, solution.y[:3].T, strict=True):
         world.simulator.AdvanceTo(time)
         # First order in the step: 0.12 rad/s at most, of steps of 0.3 rad.
         np.testing.assert_allclose(world.q, expected, atol=0.2 * time_step)

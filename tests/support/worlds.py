@@ -14,7 +14,7 @@ from lic_drake.control.mpc import MpcInput
 from lic_drake.control.tactile_sensor import TactileSensor
 from lic_drake.control.taxels import planar_taxels
 from lic_drake.robots.planar import planar_arm
-from lic_drake.scene.scene import Scene, SceneConfig, add_scene
+from lic_drake.scene.scene import Scene, SceneConfig, add_scene, make_simulator
 
 ARM = planar_arm()
 LAYOUT = planar_taxels(ARM.skin)
@@ -152,9 +152,8 @@ def make_world(
     plant = scene.plant
     plant_context = plant.GetMyMutableContextFromRoot(context)
     plant.SetPositions(plant_context, scene.arm, q)
-    world = World(
-        diagram=diagram, context=context, scene=scene, simulator=Simulator(diagram, context)
-    )
+    simulator = make_simulator(diagram, config, context)
+    world = World(diagram=diagram, context=context, scene=scene, simulator=simulator)
     world.set_equilibrium(q)
     return world
 
