@@ -11,10 +11,8 @@ import pytest
 from support.ray_casting import blank, draw_ball, draw_instance, tilted
 
 from lic_drake.clutter.foliage import FoliageApertureClutter
-from lic_drake.perception.apertures import find_apertures
 from lic_drake.perception.cameras import Views, take_views
 from lic_drake.perception.config import CameraConfig, CamerasConfig, ExternalConfig, HeadConfig
-from lic_drake.perception.goal import find_goal
 from lic_drake.seeds import make_generator
 
 CAMERA = CameraConfig(width=320, height=240, focal_px=262.5)
@@ -60,13 +58,6 @@ def test_the_external_camera_sees_the_ball_where_it_is(views: Views) -> None:
     rows, columns = np.nonzero(ball)
     assert abs(columns.mean() - column) < 1.0
     assert abs(rows.mean() - row) < 1.0
-
-
-def test_what_is_rendered_is_found(views: Views) -> None:
-    found = find_apertures(views.head, CAMERA, CLUTTER)
-    np.testing.assert_allclose(found.p_WA, CLUTTER.aperture_centres(), atol=0.004)
-    goal = find_goal(views.external, CAMERA, CAMERAS.ball_radius_m)
-    np.testing.assert_allclose(goal.p_WG, P_WG, atol=5e-4)
 
 
 def test_without_graphics_libraries_the_foliage_demo_is_refused_in_one_line_before_it_learns(

@@ -23,12 +23,6 @@ def test_the_ray_of_a_pixel_is_drawn_at_that_pixel(
     np.testing.assert_allclose(image.project(p_WQ[None]), [[column, row]], atol=1e-9)
 
 
-def test_the_optical_axis_is_in_the_middle_of_the_image() -> None:
-    image = blank(np.eye(3), np.zeros(3), width=320, height=240)
-    np.testing.assert_allclose(image.project(np.array([[0.0, 0.0, 2.0]])), [[159.5, 119.5]])
-    np.testing.assert_allclose(image.rays().mean(axis=(0, 1)), [0.0, 0.0, 1.0], atol=1e-12)
-
-
 @pytest.mark.parametrize("z", [1.0, 2.0, 4.0])
 def test_the_random_error_grows_with_the_depth_squared(z: float) -> None:
     config = replace(CLEAN, depth_sigma_per_m=1.425e-3)
