@@ -12,7 +12,7 @@ from lic_drake.paths import find_library
 if TYPE_CHECKING:
     from lic_drake.experience.workers import Workers
 
-type Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
+type Subparsers = "argparse._SubParsersAction[argparse.ArgumentParser]"
 """The object that subcommands add their parsers to."""
 
 INCOMPLETE, USER_ERROR, INTERRUPTED, BROKEN_PIPE = 1, 2, 130, 141

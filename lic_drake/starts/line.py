@@ -10,7 +10,7 @@ from lic_drake.reach.start import Starts
 from lic_drake.reach.task import BaseTrack, StartLine
 from lic_drake.robots.arm import Arm
 from lic_drake.seeds import make_generator
-from lic_drake.starts.feasible import TOLERANCE, FeasibleStarts, Region
+from lic_drake.starts.feasible import TOLERANCE, Effort, FeasibleStarts, Region
 from lic_drake.types import Vector
 
 LATTICE_SHAPE = (33, 25)
@@ -35,6 +35,11 @@ class LineStarts(FeasibleStarts):
     def arm(self) -> Arm:
         """The robot."""
         return self.robot
+
+    @property
+    def effort(self) -> Effort:  # type: ignore[override]
+        """Where the base moves, too, LIC-2 has many local optima."""
+        return Effort() if self.track is None else Effort(solves=20, solves_per_region=20)
 
     @cached_property
     def regions(self) -> tuple[Region, ...]:
