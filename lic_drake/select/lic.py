@@ -46,7 +46,10 @@ class _Best:
 
 
 def climb(program: LicProgram, region: Region, best: _Best) -> None:
-    """Improves a start by a pattern search over hand, base and torso within a region."""
+    """Improves a start by a pattern search over hand, base and torso within a region.
+
+    An L1 kernel and K-NN have kinks, on which a solver that follows gradients stops early.
+    """
     starts = program.situation.starts
     width = np.append(region.upper[:3] - region.lower[:3], region.b0_upper - region.b0_lower)
     free = np.flatnonzero(width > _SMALLEST_STEP)
