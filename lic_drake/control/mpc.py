@@ -156,7 +156,7 @@ class Prediction(NamedTuple):
 
 
 class QuadraticProgram(NamedTuple):
-    """Minimise 1/2 x'Px + c'x subject to row_min <= Ax <= row_max and x_min <= x <= x_max.
+    """Minimise 1/2 x'Px + c'x subject to lower <= (x, Ax) <= upper.
 
     P is positive definite, A may have no rows, and limits may be infinite.
     """
@@ -164,24 +164,16 @@ class QuadraticProgram(NamedTuple):
     P: Vector
     c: Vector
     A: Vector
-    row_min: Vector
-    row_max: Vector
-    x_min: Vector
-    x_max: Vector
+    lower: Vector
+    upper: Vector
 
 
 def solve(problem: QuadraticProgram) -> Vector | None:
     """Returns the minimiser, shape (n,), or None if there is none; LinAlgError if DAQP fails."""
-    # The first n limits, for which A has no rows, are those of the variables.
     x: Vector
-    x, _, flag, _ = daqp.solve(
-        problem.P,
-        problem.c,
-        problem.A,
-        np.concatenate((problem.x_max, problem.row_max)),
-        np.concatenate((problem.x_min, problem.row_min)),
-        primal_tol=1e-10,  # In the rows' units over their length.
-    )
+    # The first n limits, for which A has no rows, are those of the variables. The tolerance is in
+    # the rows' units over their length.
+    x, _, flag, _ = daqp.solve(*problem[:3], problem.upper, problem.lower, primal_tol=1e-10)
     if flag in (1, -1):  # Optimal, infeasible.
         return x if flag == 1 else None
     raise np.linalg.LinAlgError(f"DAQP ended with flag {flag}")
@@ -193,8 +185,9 @@ class HapticMpc:
     def __init__(self, config: MpcConfig, stiffness: Vector, q_min: Vector, q_max: Vector) -> None:
         self.config = config
         self._K = np.diag(stiffness)
-        self._effort = config.torque_change_weight * self._K**2
-        self._q_min, self._q_max = q_min, q_max
+        self._effort = 2.0 * config.torque_change_weight * self._K**2
+        # Limits above and below, the latter with the opposite sign, shape (2, m).
+        self._limits = np.array([q_max, -q_min])
         self._max_change = np.deg2rad(config.max_change_deg)
         self._max_windup = np.deg2rad(config.max_windup_deg)
         self._reset_windup = np.deg2rad(config.reset_windup_deg)
@@ -213,8 +206,8 @@ class HapticMpc:
         contact = self.config.contact_stiffness_N_per_m
         # Rows n_i' J_i: motion of each contact along its normal.
         rows = (state.normals[:, None] @ state.Jv_C)[:, 0]
-        _, S, _ = dposv(self._K + contact * rows.T @ rows, self._K)
-        return Prediction(joint=S, tip=state.Jv_E @ S, force=contact * rows @ S)
+        _, S, _ = dposv(self._K + contact * (rows.T @ rows), self._K)
+        return Prediction(joint=S, tip=state.Jv_E @ S, force=contact * (rows @ S))
 
     def wanted_tip_motion(self, p_EG: Vector) -> Vector:
         """Returns the desired tip motion of a step, shape (3,), metres."""
@@ -228,36 +221,38 @@ class HapticMpc:
         """Returns the quadratic program of a step in dphi."""
         config = self.config
         model = self.predict(state)
-        over = state.forces > config.force_threshold_N
+        weight = 2.0 * config.position_weight
+        P = weight * (model.tip.T @ model.tip) + self._effort
+        c = (-weight * self.wanted_tip_motion(state.p_EG)) @ model.tip
 
-        P = config.position_weight * model.tip.T @ model.tip + self._effort
-        c = -config.position_weight * self.wanted_tip_motion(state.p_EG) @ model.tip
-        if over.any():
+        # Limits of the change of each force, of the joint angles and of the equilibrium angles:
+        # rate, wind-up and joint limits.
+        over, rise, fall = list[int](), list[float](), list[float]()
+        for i, force in enumerate(state.forces.tolist()):
+            if force > config.force_threshold_N:
+                over.append(i)
+                rise.append(config.rise_over_N)
+                fall.append(-config.fall_over_N)
+            else:
+                rise.append(min(config.force_threshold_N - force, config.rise_below_N))
+                fall.append(-config.fall_below_N)
+        if over:
             rows = model.force[over]
-            weight = config.force_weight / (len(rows) if config.force_weight_shared else 1)
-            P = P + weight * rows.T @ rows
-            c = c + weight * config.force_decrease_N * rows.sum(axis=0)
-
-        # Limits of the change of each force and each joint angle.
-        margin = config.force_threshold_N - state.forces
-        rise = np.where(over, config.rise_over_N, np.minimum(margin, config.rise_below_N))
-        fall = np.where(over, config.fall_over_N, config.fall_below_N)
-        down, up = self._q_min - state.q, self._q_max - state.q
+            weight = 2.0 * config.force_weight
+            weight /= len(over) if config.force_weight_shared else 1
+            P += weight * (rows.T @ rows)
+            c += weight * config.force_decrease_N * rows.sum(axis=0)
+        q, q_d = (np.array([angles, -angles]) for angles in (state.q, state.q_d))
+        room = self._limits - q
         if config.forgive_joint_limits:
-            down, up = np.minimum(down, 0.0), np.maximum(up, 0.0)
-        # Limits of the change of the equilibrium angles: rate, wind-up and joint limits.
-        wound = state.q - state.q_d
-        x_min = np.maximum(-self._max_change, wound - self._max_windup)
-        x_max = np.minimum(self._max_change, wound + self._max_windup)
+            room = np.maximum(room, 0.0)
+        change = np.minimum(self._max_change, q - q_d + self._max_windup)
         if config.equilibrium_in_limits:
-            x_min = np.maximum(x_min, np.minimum(self._q_min - state.q_d, 0.0))
-            x_max = np.minimum(x_max, np.maximum(self._q_max - state.q_d, 0.0))
+            change = np.minimum(change, np.maximum(self._limits - q_d, 0.0))
         return QuadraticProgram(
-            P=2.0 * P,
-            c=2.0 * c,
+            P=P,
+            c=c,
             A=np.concatenate((model.force, model.joint)),
-            row_min=np.concatenate((-fall, down)),
-            row_max=np.concatenate((rise, up)),
-            x_min=x_min,
-            x_max=x_max,
+            lower=np.concatenate((-change[1], fall, -room[1])),
+            upper=np.concatenate((change[0], rise, room[0])),
         )

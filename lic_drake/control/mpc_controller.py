@@ -43,9 +43,9 @@ class HapticMpcController(LeafSystem):
         held = context.get_discrete_state(self._desired).value()[:m]
         q_d = self._mpc.pull_back(q, held)
 
-        loaded = np.flatnonzero(taxel_force > self._mpc.config.force_trim_N)
-        links = self._layout.link[loaded]
+        (loaded,) = (taxel_force > self._mpc.config.force_trim_N).nonzero()
         pose = self._arm.calc_pose(q)
+        links = self._layout.link[loaded]
         turn = pose.R_RL[links]
         p_RC = pose.p_RL[links] + np.vecdot(turn, self._layout.p_LT[loaded, None])
         state = MpcInput(
@@ -57,5 +57,6 @@ class HapticMpcController(LeafSystem):
             forces=taxel_force[loaded],
             Jv_C=self._arm.point_jacobians(pose, links, p_RC),
         )
-        desired = np.append(q_d + self._mpc.step(state), np.zeros(m))
+        desired = np.zeros(2 * m)
+        desired[:m] = q_d + self._mpc.step(state)
         discrete_state.set_value(self._desired, desired)

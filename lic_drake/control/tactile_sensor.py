@@ -146,18 +146,23 @@ def calc_taxel_forces(
             continue
         mine, R = layout.of_link[link], R_RL[link]
         p_LQ = (p_RQ - p_RL[link]) @ R
-        under = mine.compare_distances(p_LQ).argmin(axis=1)
-        p_LT = mine.p_LT[under]
-        span = p_LT.max(axis=0) - p_LT.min(axis=0)
-        if span @ span <= (1.5 * layout.pitch_m) ** 2:
-            # Not the sum of the magnitudes: facets of a coarse mesh and corners spread directions.
-            f_L = force @ n_R @ R
-            size = math.sqrt(f_L @ f_L)
-            facing = mine.n_L @ f_L >= _MAX_ANGLE_COS * size
-            distance = mine.compare_distances(force @ p_LQ / total)
-            if facing.any():
-                distance = np.where(facing, distance, np.inf)
-            forces[mine.taxels[np.argmin(distance)]] += size
+        extent = p_LQ.max(axis=0) - p_LQ.min(axis=0)
+        # What is no wider than the distance of two taxels lies over neighbours in any case.
+        if extent @ extent > layout.pitch_m**2:
+            under = mine.compare_distances(p_LQ).argmin(axis=1)
+            p_LT = mine.p_LT[under]
+            extent = p_LT.max(axis=0) - p_LT.min(axis=0)
+            if extent @ extent > (1.5 * layout.pitch_m) ** 2:
+                np.add.at(forces, mine.taxels[under], force)
+                continue
+        # Not the sum of the magnitudes: facets of a coarse mesh and corners spread directions.
+        f_L = force @ n_R @ R
+        size = math.sqrt(f_L @ f_L)
+        distance = mine.compare_distances(force @ p_LQ / total)
+        (facing,) = (mine.n_L @ f_L >= _MAX_ANGLE_COS * size).nonzero()
+        if len(facing):
+            nearest = facing[distance[facing].argmin()]
         else:
-            np.add.at(forces, mine.taxels[under], force)
+            nearest = distance.argmin()
+        forces[mine.taxels[nearest]] += size
     return forces

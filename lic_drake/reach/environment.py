@@ -4,8 +4,9 @@ import numpy as np
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.reach.request import is_within_reach
+from lic_drake.reach.rig import Rig
 from lic_drake.reach.scenario import Scenario
-from lic_drake.reach.simulation import Cache, Rig, Simulation, simulate
+from lic_drake.reach.simulation import Cache, Simulation, simulate
 from lic_drake.reach.sleeping import MovedTooFarError, World, make_sleeping
 from lic_drake.reach.start import Start
 from lic_drake.reach.trace import ReachResult, ReachTrace

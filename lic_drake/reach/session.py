@@ -13,7 +13,8 @@ import lic_drake
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.reach.environment import MAX_DIAGRAMS, Environment
 from lic_drake.reach.request import ReachRecord, ReachRequest, flat_starts
-from lic_drake.reach.simulation import Cache, Rig
+from lic_drake.reach.rig import Rig
+from lic_drake.reach.simulation import Cache
 from lic_drake.reach.start import IN_SPACE, POSE_AXES
 from lic_drake.reach.trace import ReachResult
 from lic_drake.types import Vector

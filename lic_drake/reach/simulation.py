@@ -1,4 +1,4 @@
-"""A reach under way: the context of a reach diagram, and the loop that runs it to its end."""
+"""A reach under way, and the loop that runs it to its end."""
 
 import gc
 import math
@@ -6,53 +6,13 @@ from collections import deque
 from collections.abc import Callable, Hashable
 
 import numpy as np
-from pydrake.systems.analysis import Simulator
 
-from lic_drake.reach.diagram import ReachDiagram
+from lic_drake.reach.rig import Rig, Stepper
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.task import StopConfig
 from lic_drake.reach.trace import ReachResult, ReachTrace, SceneState
 from lic_drake.scene.collision import is_touching
 from lic_drake.types import Vector
-
-
-class Rig:
-    """A diagram and a context of it, used for one reach after another.
-
-    Creating a context costs as much as some ten control periods. `shown` is for who changes the
-    fixed objects.
-    """
-
-    def __init__(self, diagram: ReachDiagram) -> None:
-        self.diagram, self.scene, self.plant = diagram, diagram.scene, diagram.scene.plant
-        self.context = diagram.diagram.CreateDefaultContext()
-        self.plant_context = self.plant.GetMyMutableContextFromRoot(self.context)
-        self.taxel_force = diagram.diagram.GetOutputPort("taxel_force")
-        self.q_clutter_first = self.clutter_positions().copy()
-        self.shown: object = None
-
-    def clutter_positions(self) -> Vector:
-        """Returns the movable part of the clutter as in `SceneState.q_clutter`."""
-        q_clutter = self.plant.GetPositions(self.plant_context, self.scene.clutter)
-        return q_clutter.reshape(-1, self.scene.num_axes)
-
-    def state(self) -> SceneState:
-        """Returns the state of arm and clutter."""
-        plant, context, scene = self.plant, self.plant_context, self.scene
-        return SceneState(
-            q=plant.GetPositions(context, scene.arm),
-            v=plant.GetVelocities(context, scene.arm),
-            q_clutter=self.clutter_positions(),
-            v_clutter=plant.GetVelocities(context, scene.clutter).reshape(-1, scene.num_axes),
-        )
-
-    def set_state(self, state: SceneState) -> None:
-        """Sets the state of arm and clutter."""
-        plant, context, scene = self.plant, self.plant_context, self.scene
-        plant.SetPositions(context, scene.arm, state.q)
-        plant.SetVelocities(context, scene.arm, state.v)
-        plant.SetPositions(context, scene.clutter, state.q_clutter.ravel())
-        plant.SetVelocities(context, scene.clutter, state.v_clutter.ravel())
 
 
 class Simulation:
@@ -71,7 +31,7 @@ class Simulation:
         rig.diagram.set_start(rig.context, q, p_RG)
         first = rig.q_clutter_first
         rig.set_state(rig.state()._replace(q_clutter=first, v_clutter=np.zeros_like(first)))
-        self._simulator: Simulator | None = None
+        self._stepper: Stepper | None = None
 
     def is_in_collision(self) -> bool:
         """Returns whether the arm touches anything."""
@@ -83,11 +43,10 @@ class Simulation:
         Raises:
             RuntimeError: Drake found no solution, or a system failed.
         """
-        if self._simulator is None:
+        if self._stepper is None:
             # A new one, because an integrator's memory would make a reach depend on the one before.
-            self._simulator = self._rig.diagram.make_simulator(self._rig.context)
-            self._simulator.Initialize()
-        self._simulator.AdvanceTo(time_s)
+            self._stepper = Stepper(self._rig)
+        self._stepper.advance_to(time_s)
 
     def joint_angles(self) -> Vector:
         """Returns the arm's q, shape (m,), radians."""
@@ -95,7 +54,7 @@ class Simulation:
 
     def taxel_force(self) -> Vector:
         """Returns the sensor's reading, shape (num_taxels,), N."""
-        return np.asarray(self._rig.taxel_force.Eval(self._rig.context))
+        return self._rig.taxel_force()
 
     def state(self) -> SceneState:
         """Returns the state of the arm and of everything movable, asleep or awake."""

@@ -15,8 +15,9 @@ from pydrake.geometry import CollisionFilterDeclaration, GeometrySet
 
 from lic_drake.clutter.instance import ClutterInstance, Stems
 from lic_drake.reach.diagram import make_reach_diagram
+from lic_drake.reach.rig import Rig
 from lic_drake.reach.scenario import Scenario
-from lic_drake.reach.simulation import Cache, Rig, Simulation
+from lic_drake.reach.simulation import Cache, Simulation
 from lic_drake.reach.trace import SceneState
 from lic_drake.robots.arm import Arm
 from lic_drake.scene.scene import make_shape, pose_of
@@ -221,7 +222,7 @@ class PartlyAsleep(Simulation):
 
     def release(self) -> None:
         """Leaves the rig that was used last to the cache."""
-        del self._rig, self._simulator
+        del self._rig, self._stepper
 
     def _go_on_in(self, rig: Rig, q: Vector) -> None:
         """Continues in another rig of the same arm, at the same time, with its controller."""

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import cast
 
@@ -135,6 +136,21 @@ class Arm:
     def num_joints(self) -> int:
         """Number of joints m."""
         return len(self.q_min)
+
+    @cached_property
+    def levers(self) -> Vector:
+        """How far the axis of any skin shape can be from each joint, at most, (m,), metres."""
+        pose = self.calc_pose(np.zeros(self.num_joints))
+        along = np.append(0.0, np.linalg.norm(np.diff(self.p_RJ, axis=0), axis=1).cumsum())
+        levers = np.zeros(self.num_joints)
+        for capsule in (shape.enclosing_capsule() for shape in self.skin):
+            link = self.link_names.index(capsule.link)
+            last = int(self._moves[link].sum()) - 1
+            centre = pose.p_RL[link] + pose.R_RL[link] @ capsule.p_LS
+            beyond = 0.5 * capsule.size[1] + math.dist(centre, self.p_RJ[last])
+            reach = along[last] - along[: last + 1] + beyond
+            levers[: last + 1] = np.maximum(levers[: last + 1], reach)
+        return levers
 
     @property
     def pose_size(self) -> int:

@@ -97,6 +97,7 @@ class Kinematics:
             context, JacobianWrtVariable.kV, self._tip, np.zeros(3), world, world
         )
         p_RE, Jw_E, Jv_E = X_RE.translation(), J[:3], J[3:]
+        turn = cross_matrix(Jw_E)
         return frozen(
             ArmPose(
                 R_RL=np.array([X.rotation().matrix() for X in X_RL]),
@@ -105,8 +106,8 @@ class Kinematics:
                 R_RE=X_RE.rotation().matrix(),
                 Jv_E=Jv_E,
                 Jw_E=Jw_E,
-                turn=cross_matrix(Jw_E),
-                moment=np.cross(Jw_E, p_RE, axisa=0, axisc=0) - Jv_E,
+                turn=turn,
+                moment=(p_RE @ turn).reshape(3, -1) - Jv_E,
             )
         )
 

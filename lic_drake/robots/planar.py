@@ -16,13 +16,13 @@ from lic_drake.robots.kinematics import (
     ArmPose,
     Kinematics,
     cross_matrix,
-    frozen,
     wrap_angle,
 )
 from lic_drake.types import Vector
 
 _AXES = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
 _TURN = cross_matrix(_AXES)
+_AXES.flags.writeable = _TURN.flags.writeable = False
 
 
 class PlanarKinematics(Kinematics):
@@ -59,23 +59,29 @@ class PlanarKinematics(Kinematics):
         x2, y2 = l1 * s1, -l1 * c1
         x3, y3 = x2 + l2 * s2, y2 - l2 * c2
         xE, yE = x3 + l3 * s3, y3 - l3 * c3
-        return frozen(
-            ArmPose(
-                R_RL=np.array(
-                    [
-                        [[c1, -s1, 0.0], [s1, c1, 0.0], [0.0, 0.0, 1.0]],
-                        [[c2, -s2, 0.0], [s2, c2, 0.0], [0.0, 0.0, 1.0]],
-                        [[c3, -s3, 0.0], [s3, c3, 0.0], [0.0, 0.0, 1.0]],
-                    ]
-                ),
-                p_RL=np.array([[0.0, 0.0, 0.0], [x2, y2, 0.0], [x3, y3, 0.0]]),
-                p_RE=np.array([xE, yE, 0.0]),
-                R_RE=np.array([[s3, c3, 0.0], [-c3, s3, 0.0], [0.0, 0.0, 1.0]]),
-                Jv_E=np.array([[-yE, y2 - yE, y3 - yE], [xE, xE - x2, xE - x3], [0.0, 0.0, 0.0]]),
-                Jw_E=_AXES,
-                turn=_TURN,
-                moment=np.array([[-0.0, -y2, -y3], [0.0, x2, x3], [0.0, 0.0, 0.0]]),
-            )
+        # One array for all, because making arrays takes most of the time.
+        values = np.array(
+            [
+                *(c1, -s1, 0.0, s1, c1, 0.0, 0.0, 0.0, 1.0),
+                *(c2, -s2, 0.0, s2, c2, 0.0, 0.0, 0.0, 1.0),
+                *(c3, -s3, 0.0, s3, c3, 0.0, 0.0, 0.0, 1.0),
+                *(0.0, 0.0, 0.0, x2, y2, 0.0, x3, y3, 0.0),
+                *(xE, yE, 0.0),
+                *(s3, c3, 0.0, -c3, s3, 0.0, 0.0, 0.0, 1.0),
+                *(-yE, y2 - yE, y3 - yE, xE, xE - x2, xE - x3, 0.0, 0.0, 0.0),
+                *(0.0, -y2, -y3, 0.0, x2, x3, 0.0, 0.0, 0.0),
+            ]
+        )
+        values.flags.writeable = False
+        return ArmPose(
+            R_RL=values[:27].reshape(3, 3, 3),
+            p_RL=values[27:36].reshape(3, 3),
+            p_RE=values[36:39],
+            R_RE=values[39:48].reshape(3, 3),
+            Jv_E=values[48:57].reshape(3, 3),
+            Jw_E=_AXES,
+            turn=_TURN,
+            moment=values[57:].reshape(3, 3),
         )
 
     def tip_pose(self, q: Vector) -> Vector:

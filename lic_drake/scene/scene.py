@@ -40,6 +40,11 @@ class SceneConfig:
     # appears as a single force of hundreds of newtons.
     cenic_accuracy: float = 1e-4
     cenic_max_step_s: float = 0.01
+    # While the arm moves less than this in a control period, metres, a reach needs a single step of
+    # CENIC for it (twice as far: two steps, beyond: four), unless the total force on the skin rises
+    # by more than the second value, N. 0: always error control.
+    calm_move_m: float = 0.0
+    calm_rise_N: float = 1.0
     # Contact approximation of a discrete plant.
     contact_approximation: str = "lagged"
     # Dry friction of a movable object on the ground, N (authors' simulator), and the speed at which
@@ -62,8 +67,12 @@ class SceneConfig:
                 "contact_approximation must be one of sap, similar, lagged,"
                 f" got {self.contact_approximation!r}"
             )
-        names = "cenic_accuracy cenic_max_step_s ground_friction_N ground_creep_m_per_s"
-        check_numbers(self, positive=[*names.split(), "drag_N_s_per_m", "taxels_per_m"])
+        names = "cenic_accuracy cenic_max_step_s ground_friction_N ground_creep_m_per_s calm_rise_N"
+        check_numbers(
+            self,
+            positive=[*names.split(), "drag_N_s_per_m", "taxels_per_m"],
+            non_negative=["calm_move_m"],
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,17 +206,22 @@ def make_simulator(
     context = diagram.CreateDefaultContext() if context is None else context
     simulator = Simulator(diagram, context)
     if config.time_step_s == 0.0:
-        longest_s = config.cenic_max_step_s * (1.0 + _STEP_SLACK)
-        simulator_config = SimulatorConfig(
-            integration_scheme="cenic",
-            accuracy=config.cenic_accuracy,
-            max_step_size=longest_s,
-            start_time=context.get_time(),
+        ApplySimulatorConfig(
+            SimulatorConfig(integration_scheme="cenic", start_time=context.get_time()), simulator
         )
-        ApplySimulatorConfig(simulator_config, simulator)
-        # Instead of a tenth of it: nearly all steps have the maximum length.
-        simulator.get_mutable_integrator().request_initial_step_size_target(longest_s)
+        set_steps(simulator, config)
     return simulator
+
+
+def set_steps(simulator: Simulator, config: SceneConfig, fixed_s: float = 0.0) -> None:
+    """Lets CENIC control its error, or else make steps of a fixed length, seconds."""
+    longest_s = (fixed_s or config.cenic_max_step_s) * (1.0 + _STEP_SLACK)
+    integrator = simulator.get_mutable_integrator()
+    integrator.set_fixed_step_mode(fixed_s > 0.0)
+    integrator.set_target_accuracy(config.cenic_accuracy)
+    # Instead of a tenth of it: nearly all steps have the maximum length.
+    integrator.request_initial_step_size_target(longest_s)
+    integrator.set_maximum_step_size(longest_s)
 
 
 def _add_surroundings(plant: MultibodyPlant) -> RigidBody:

@@ -23,10 +23,8 @@ def random_problem(rng: np.random.Generator, scale: float = 1.0) -> QuadraticPro
         P=P,
         c=rng.normal(size=n) * 10.0 ** rng.uniform(-3.0, 0.0),
         A=A,
-        row_min=centre - width[0],
-        row_max=centre + width[1],
-        x_min=np.full(n, -0.1),
-        x_max=np.full(n, 0.1),
+        lower=np.concatenate([np.full(n, -0.1), centre - width[0]]),
+        upper=np.concatenate([np.full(n, 0.1), centre + width[1]]),
     )
 
 
@@ -38,9 +36,8 @@ def solve_with_clarabel(problem: QuadraticProgram) -> np.ndarray | None:
     program = MathematicalProgram()
     x = program.NewContinuousVariables(len(problem.c))
     program.AddQuadraticCost(problem.P, problem.c, x, is_convex=True)
-    program.AddBoundingBoxConstraint(problem.x_min, problem.x_max, x)
-    if len(problem.A):
-        program.AddLinearConstraint(problem.A, problem.row_min, problem.row_max, x)
+    rows = np.vstack([np.eye(len(x)), problem.A])
+    program.AddLinearConstraint(rows, problem.lower, problem.upper, x)
     result = ClarabelSolver().Solve(program)
     return result.GetSolution(x) if result.is_success() else None
 
@@ -80,5 +77,6 @@ def test_a_program_without_a_minimum_is_an_error_and_a_row_of_zeros_may_rule_all
     problem = random_problem(np.random.default_rng(0))
     with pytest.raises(np.linalg.LinAlgError):
         solve(problem._replace(P=np.diag(np.append(-1.0, np.ones(len(problem.c) - 1)))))
-    row, limit = np.zeros((1, len(problem.c))), np.ones(1)
-    assert solve(problem._replace(A=row, row_min=limit, row_max=2.0 * limit)) is None
+    n = len(problem.c)
+    lower, upper = np.append(-np.ones(n), 1.0), np.append(np.ones(n), 2.0)
+    assert solve(problem._replace(A=np.zeros((1, n)), lower=lower, upper=upper)) is None

@@ -10,9 +10,10 @@ from lic_drake.experience.collect import CollectionRequest
 from lic_drake.reach.diagram import make_reach_diagram
 from lic_drake.reach.environment import Environment
 from lic_drake.reach.request import ReachRequest
+from lic_drake.reach.rig import Rig
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.session import ReachSession, run_reach
-from lic_drake.reach.simulation import Rig, Simulation, simulate
+from lic_drake.reach.simulation import Simulation, simulate
 from lic_drake.reach.start import Start
 from lic_drake.reach.trace import ReachResult
 from lic_drake.robots.pr2 import Q_HOME

@@ -13,9 +13,10 @@ from lic_drake.evaluate.trial import random_requests
 from lic_drake.reach import sleeping
 from lic_drake.reach.diagram import ReachDiagram, make_reach_diagram
 from lic_drake.reach.environment import Environment
+from lic_drake.reach.rig import Rig
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.session import ReachSession
-from lic_drake.reach.simulation import Cache, Rig
+from lic_drake.reach.simulation import Cache
 from lic_drake.reach.sleeping import SleepingObjects, World, set_fixed_objects
 from lic_drake.reach.start import Start
 from lic_drake.reach.trace import ReachResult
@@ -144,7 +145,7 @@ def forces(made: ReachDiagram, furniture: ClutterInstance | None = None) -> np.n
     total = []
     for q in rng.uniform(arm.q_min, arm.q_max, (60, 3)):
         made.set_start(rig.context, q, np.zeros(3))
-        total.append(np.sum(rig.taxel_force.Eval(rig.context)))
+        total.append(np.sum(rig.taxel_force()))
     return np.array(total)
 
 

@@ -59,8 +59,5 @@ def largest_margin(problem: QuadraticProgram) -> float:
 
 def _all_rows(problem: QuadraticProgram) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Rows, lower and upper limits, the variables' own bounds among them."""
-    return (
-        np.vstack([problem.A, np.eye(len(problem.c))]),
-        np.concatenate([problem.row_min, problem.x_min]),
-        np.concatenate([problem.row_max, problem.x_max]),
-    )
+    rows = np.vstack([np.eye(len(problem.c)), problem.A])
+    return rows, problem.lower, problem.upper
