@@ -4,7 +4,7 @@ import cProfile
 import pstats
 import re
 import time
-from collections import defaultdict
+from collections import Counter, defaultdict
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -12,7 +12,7 @@ from typing import Any
 import lic_drake
 from lic_drake.evaluate.trial import random_requests
 from lic_drake.reach.scenario import Scenario
-from lic_drake.reach.session import run_reach
+from lic_drake.reach.session import run_reach, simulate_request
 
 PARTS = {
     r"reach/.*:advance_to$": "physics",  # It calls Drake's `Simulator.AdvanceTo`.
@@ -32,14 +32,16 @@ def measure_reaches(scenario: Scenario, reaches: int, per_environment: int = 5) 
 
     Returns medians over the reaches, seconds; `split` holds shares of time under Python's profiler,
     which overstates Python's part: physics (Drake's time steps), sensor (contacts and taxels), mpc,
-    build (models, diagrams, contexts, waking objects), rest (stop rules, records).
+    build (models, diagrams, contexts, waking objects), rest (stop rules, records). `per_sim_s`
+    tells what CENIC did, see `lic_drake.reach.rig.Stepper`.
     """
     environments = -(-reaches // per_environment)
     requests = random_requests(scenario, "calibration", environments + 1, per_environment)
     records = [run_reach(request) for request in requests[:reaches]]
     with cProfile.Profile(time.process_time) as profile:
-        for request in requests[-per_environment:]:
-            run_reach(request)
+        traces = [simulate_request(request).trace for request in requests[-per_environment:]]
+    done = sum((trace.statistics for trace in traces), Counter())
+    profiled_s = sum(trace.time_s[-1] for trace in traces if trace.time_s)
     moving = [record for record in records if record.duration_s > 0.0]
     return {
         "robot": scenario.robot,
@@ -49,6 +51,7 @@ def measure_reaches(scenario: Scenario, reaches: int, per_environment: int = 5) 
         "wall_per_reach_s": median(record.wall_time_s for record in moving),
         "wall_per_sim_s": median(record.wall_time_s / record.duration_s for record in moving),
         "split": split_time(pstats.Stats(profile)),
+        "per_sim_s": {name: count / profiled_s for name, count in sorted(done.items())},
     }
 
 

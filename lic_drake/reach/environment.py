@@ -100,6 +100,7 @@ class Environment:
                 q0 = q
                 break
         result = simulate(simulation, self.scenario, q0, p_RG, keep_states)
+        result.trace.statistics = simulation.statistics()
         if result.trace.q:
             q_clutter = simulation.state().q_clutter
             result.trace.q_clutter = q_clutter if np.all(np.isfinite(q_clutter)) else None

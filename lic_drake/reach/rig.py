@@ -5,6 +5,7 @@ object does not: `Stepper` first makes a few fixed steps of CENIC, one solve eac
 a rising force at their end, it simulates the period again from its beginning, with error control.
 """
 
+from collections import Counter
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,12 @@ from lic_drake.scene.scene import set_steps
 from lic_drake.types import Vector
 
 _MOST_STEPS = 4
+_COUNTS = {
+    "integrator_num_steps_taken": "steps",
+    "integrator_num_step_shrinkages_from_error_control": "shrunk",
+    "cenic_total_solver_iterations": "iterations",
+    "cenic_total_hessian_factorizations": "factorizations",
+}
 
 
 class Instant(NamedTuple):
@@ -90,8 +97,8 @@ class Stepper:
         self._rig, self._config = rig, rig.diagram.config
         self._simulator = rig.diagram.make_simulator(rig.context)
         self._simulator.Initialize()
-        self._integrator = self._simulator.get_mutable_integrator()
         self._fixed_s = 0.0
+        self._periods: Counter[str] = Counter()
 
     def advance_to(self, time_s: float) -> None:
         """Simulates up to a control instant, without its control update.
@@ -101,9 +108,10 @@ class Stepper:
         """
         config, rig = self._config, self._rig
         period_s = time_s - rig.context.get_time()
-        if config.calm_move_m == 0.0 or period_s <= 0.0:
+        if period_s <= 0.0 or config.calm_move_m == 0.0 or config.time_step_s > 0.0:
             self._simulator.AdvanceTo(time_s)
             return
+        self._periods["periods"] += 1
         before, force = rig.save(), rig.taxel_force().sum()
         v = rig.plant.GetVelocities(rig.plant_context, rig.scene.arm)
         self._fix(period_s / self._steps(period_s * float(np.abs(v) @ rig.scene.robot.levers)))
@@ -113,10 +121,20 @@ class Stepper:
                 return
         except RuntimeError:
             pass
+        self._periods = self.statistics() + Counter(repeated=1)
         rig.restore(before)
         self._fix(0.0)
-        self._simulator.Initialize()
+        self._simulator.Initialize()  # It forgets its statistics.
         self._simulator.AdvanceTo(time_s)
+
+    def statistics(self) -> Counter[str]:
+        """Returns how often CENIC did what, and how many control periods were simulated again."""
+        counts = self._periods.copy()
+        if self._config.time_step_s == 0.0:
+            for name, value in self._simulator.get_integrator().GetStatisticsSummary():
+                if name in _COUNTS:
+                    counts[_COUNTS[name]] += int(value)
+        return counts
 
     def _steps(self, move_m: float) -> int:
         """Returns in how many steps the arm makes a move."""

@@ -2,7 +2,7 @@
 
 import gc
 import math
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Hashable
 
 import numpy as np
@@ -18,6 +18,8 @@ from lic_drake.types import Vector
 class Simulation:
     """What `simulate` runs: here all is simulated; what sleeps or another engine is a subclass."""
 
+    _stepper: Stepper | None = None
+
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
 
@@ -31,7 +33,12 @@ class Simulation:
         rig.diagram.set_start(rig.context, q, p_RG)
         first = rig.q_clutter_first
         rig.set_state(rig.state()._replace(q_clutter=first, v_clutter=np.zeros_like(first)))
-        self._stepper: Stepper | None = None
+        self._earlier = self.statistics() if time_s > 0.0 else Counter()
+        self._stepper = None
+
+    def statistics(self) -> Counter[str]:
+        """Returns what `Stepper.statistics` counts, for the reach so far."""
+        return self._earlier + (self._stepper.statistics() if self._stepper else Counter())
 
     def is_in_collision(self) -> bool:
         """Returns whether the arm touches anything."""

@@ -1,5 +1,6 @@
 """What happened during a reach, sample by sample, and the figures that a record keeps of it."""
 
+from collections import Counter
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -40,6 +41,7 @@ class ReachTrace:
         states: The state of the scene at each sample, if it was asked for.
         b0: Position of R, shape (3,), metres.
         q_clutter: As in `SceneState`, at the end; None where there is none or it is not finite.
+        statistics: How often the integrator did what, see `lic_drake.reach.rig.Stepper`.
     """
 
     time_s: list[float] = field(default_factory=list)
@@ -51,6 +53,7 @@ class ReachTrace:
     states: list[SceneState] = field(default_factory=list)
     b0: Vector = field(default_factory=lambda: np.zeros(3))
     q_clutter: Vector | None = None
+    statistics: Counter[str] = field(default_factory=Counter)
 
     def append(self, time_s: float, q: Vector, p_WE: Vector, taxel_force: Vector) -> None:
         """Adds a sample; `taxel_force` has shape (num_taxels,), N."""
