@@ -33,6 +33,16 @@ _NUM_SEEDS = 32
 _DISTINCT_RAD = 1e-5
 
 
+_PERMUTATION = np.array(
+    [
+        *([0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]),
+        *([0.0, 0.0, -1.0], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0]),
+        *([0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]),
+    ]
+)
+"""Entry (3 i + k, l) is the sign of the permutation (k, l, i), else 0."""
+
+
 class ArmPose(NamedTuple):
     """Where the arm is at one configuration of m joints; all arrays are read-only.
 
@@ -59,9 +69,8 @@ class ArmPose(NamedTuple):
 
 def cross_matrix(axes: Vector) -> Vector:
     """Returns `ArmPose.turn` of joint axes, shape (3, m)."""
-    x, y, z = axes
-    zero = np.zeros_like(x)
-    return np.array([[zero, z, -y], [-z, zero, x], [y, -x, zero]]).reshape(3, -1)
+    turn: Vector = (_PERMUTATION @ axes).reshape(3, -1)
+    return turn
 
 
 def wrap_angle(angle: float) -> float:
