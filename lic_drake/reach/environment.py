@@ -50,7 +50,7 @@ class Environment:
         self.b0 = scenario.task.b0 if b0 is None else b0
         height_m = float(self.b0[2])
         self.arm.check_height(height_m)
-        diagrams = Cache[Rig](MAX_DIAGRAMS) if cache is None else cache
+        diagrams = Cache[Rig](MAX_DIAGRAMS, cyclic=True) if cache is None else cache
         self._world = World(scenario, instance.translated(-self.b0), height_m, diagrams)
         self._token = object()
         self._sleeping = make_sleeping(self._world) if sleep else None

@@ -37,7 +37,7 @@ class ReachSession:
 
     def __init__(self, sleep: bool = True) -> None:
         self.sleep = sleep
-        self.diagrams: Cache[Rig] = Cache(MAX_DIAGRAMS)
+        self.diagrams: Cache[Rig] = Cache(MAX_DIAGRAMS, cyclic=True)
         self.environments: Cache[Environment] = Cache(MAX_ENVIRONMENTS)
         # Positions of the movable objects at the end of reaches, by the request's key.
         self.ends: Cache[Vector] = Cache(MAX_ENDS)

@@ -72,14 +72,14 @@ class Simulation:
 
 
 class Cache[T](dict[Hashable, T]):
-    """The most recently used items, at most `size` of them.
+    """The most recently used items, at most `size` of them; then half of them are dropped.
 
-    Diagrams with Python systems are reference cycles, which only Python's collector frees: it runs
-    when items are dropped, which happens to half of them at once.
+    Diagrams with Python systems are reference cycles, which only Python's collector frees: where
+    items are `cyclic`, it runs when they are dropped.
     """
 
-    def __init__(self, size: int) -> None:
-        self.size = size
+    def __init__(self, size: int, cyclic: bool = False) -> None:
+        self.size, self._cyclic = size, cyclic
 
     def obtain(self, key: Hashable, make: Callable[[], T]) -> T:
         """Returns the item of a key, made when it is missing."""
@@ -87,7 +87,8 @@ class Cache[T](dict[Hashable, T]):
         if len(self) >= self.size:
             for old in list(self)[: (self.size + 1) // 2]:
                 del self[old]
-            gc.collect()
+            if self._cyclic:
+                gc.collect()
         self[key] = item
         return item
 

@@ -2,15 +2,23 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 
 from lic_drake.clutter.instance import ClutterInstance
-from lic_drake.reach.environment import Environment
+from lic_drake.reach.environment import MAX_DIAGRAMS, Environment
 from lic_drake.reach.request import ReachRequest
+from lic_drake.reach.rig import Rig
 from lic_drake.reach.scenario import Scenario
-from lic_drake.reach.simulation import simulate
+from lic_drake.reach.simulation import Cache, simulate
 from lic_drake.reach.trace import ReachResult
 from scripts.mujoco.mujoco_scene import MujocoConfig
 from scripts.mujoco.mujoco_simulation import MujocoSimulation
+
+
+@cache
+def _diagrams(engine: "Engine") -> Cache[Rig]:
+    """Returns the diagrams that an engine keeps, as a session does."""
+    return Cache(MAX_DIAGRAMS, cyclic=True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,5 +58,5 @@ class Engine:
             scenario = replace(
                 scenario, scene=replace(scenario.scene, time_step_s=self.time_step_s)
             )
-        environment = Environment(scenario, instance, sleep=self.sleep)
+        environment = Environment(scenario, instance, self.sleep, cache=_diagrams(self))
         return lambda request: environment.reach(request.goal, request.start.x0)
