@@ -8,8 +8,10 @@ import pytest
 from hypothesis import settings
 
 os.environ["MPLBACKEND"] = "Agg"
-# Several test processes share the cores; waiting BLAS threads would only slow each other down.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# Several test processes share the cores, where threads that wait for each other take most of the
+# time: scikit-learn's trees needed 30 s instead of 2.
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(name, "1")
 
 # A shell without job control ignores Ctrl-C in what it runs in the background, and child processes
 # inherit that; tests that interrupt a child would wait forever.

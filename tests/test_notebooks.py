@@ -1,4 +1,4 @@
-"""The notebooks run, those of results from made-up records and from the committed ones.
+"""The notebooks run, those of results from the committed records.
 
 Notebooks of results are committed without outputs, because the records are; the others with small
 ones, as `python scripts/run_notebooks.py` leaves them.
@@ -18,10 +18,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from nbclient import NotebookClient
 from support.browser import assert_shows_a_scene, visit
-from support.trial_rows import fill_records
 
 from lic_drake.clutter.registry import category_names
-from lic_drake.evaluate.paper import REMARKS, TABLES
+from lic_drake.evaluate.paper import REMARKS
 
 NOTEBOOKS = Path(__file__).resolve().parent.parent / "notebooks"
 NAMES = ["tables", "figures"]
@@ -42,11 +41,6 @@ RECORDINGS = dict(zip(TOURS, [1, 0, 0, 1, 1, 0], strict=True))
 
 MAX_NOTEBOOK_BYTES = 200_000
 MAX_SECONDS = 60.0
-RECORDS = [
-    *(f"{category}/trials.parquet" for category in TABLES),
-    "learning_curve/learning_curve.csv",
-    "cross_validation/calibration_curves.csv",
-]
 
 
 def read(name: str) -> nbformat.NotebookNode:
@@ -104,9 +98,8 @@ def test_notebooks_hold_no_logic(name: str) -> None:
     assert not any(word in text for text in code(read(name)) for word in ("def ", "if ", "while "))
 
 
-def test_the_tables_are_shown(tmp_path: Path) -> None:
-    fill_records(tmp_path / "results")
-    notebook = run("tables", tmp_path)
+def test_the_tables_are_shown() -> None:
+    notebook = run("tables", NOTEBOOKS)
     shown = list(outputs(notebook, "text/markdown"))
     assert [text.split(".")[0] for text in shown if text.startswith("Table")] == [
         "Table I",
@@ -118,19 +111,10 @@ def test_the_tables_are_shown(tmp_path: Path) -> None:
     assert notebook.cells[-1].outputs[0].text.count("\n") == len(REMARKS)
 
 
-def test_the_figures_are_shown(tmp_path: Path) -> None:
-    fill_records(tmp_path / "results")
-    notebook = run("figures", tmp_path)
+def test_the_figures_are_shown() -> None:
+    notebook = run("figures", NOTEBOOKS)
     drawn = [text for text in code(notebook) if "_figure(" in text]
     assert len(list(outputs(notebook, "image/png"))) == len(drawn) == 13
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_notebooks_run_from_the_committed_records(name: str) -> None:
-    missing = [record for record in RECORDS if not (NOTEBOOKS / "results" / record).exists()]
-    if missing:
-        pytest.skip(f"notebooks/results/{missing[0]} is not there yet")
-    run(name, NOTEBOOKS)
 
 
 def test_the_categories_are_drawn_by_name_with_their_own_objects_and_starts() -> None:

@@ -119,7 +119,10 @@ WRONG = [
     ("experience add {none} {file} --source lab", ".csv or .parquet"),
     ("experience merge {file}/new.parquet {none}", "no experience library"),
     ("evaluate {none} --methods jungle", "choose one of"),
-    ("evaluate {none} --library passage-clutter --goals 2", "offers 1 goal, 2 were asked for"),
+    (
+        "evaluate {none} --library passage-clutter --methods cost --goals 2 --set {short}",
+        "offers 1 goal, 2 were asked for",
+    ),
     ("evaluate {none} --library {none}", "make one with: lic collect"),
     ("gallery {file}", "cannot write into"),
     ("gallery {none} --method jungle", "choose one of"),
@@ -134,6 +137,7 @@ def test_a_users_mistake_is_one_line_that_says_what_to_do(
 ) -> None:
     (tmp_path / "file").write_text("no library")
     places = {"none": tmp_path / "none", "file": tmp_path / "file"}
+    places["short"] = '{"stop":{"timeout_s":0.04}}'
     assert main([word.format(**places) for word in command.split()]) == 2
     output, error = capsys.readouterr()
     assert output == "" and error.endswith("\n")

@@ -3,16 +3,26 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.made_up import planar_library
 
 from lic_drake.cli.main import main
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
+from lic_drake.reach.scenario import load_scenario
 from lic_drake.select.registry import make_selector
 from lic_drake.select.situation import FailedReach, Situation
 from lic_drake.starts import make_starts
 
+GOAL = ("--goal", "0.6", "0.1")
 START = {"start_y": -0.1, "start_phi": 0.5235987755982988}
 FINAL = {"final_x": 0.52, "final_y": -0.02}
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> ExperienceLibrary:
+    """A small one, from which LIC-2 learns in no time."""
+    scenario = load_scenario("cylinder-clutter")
+    return planar_library(tmp_path_factory.mktemp("cylinders") / "library", scenario)
 
 
 def select(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
@@ -22,12 +32,13 @@ def select(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, st
 
 
 def test_after_a_failure_the_command_answers_as_lic_2_does(
-    capsys: pytest.CaptureFixture[str],
+    library: ExperienceLibrary, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    arguments = ["--goal", "0.6", "0.1", "--method", "knn", "--json"]
-    code, out, _ = select(capsys, *arguments, "--failed", json.dumps(START | FINAL))
+    arguments = [*GOAL, "--library", str(library.path), "--json"]
+    code, out, _ = select(
+        capsys, *arguments, "--method", "knn", "--failed", json.dumps(START | FINAL)
+    )
     assert code == 0
-    library = ExperienceLibrary(shipped_library("cylinder-clutter"))
     scenario = library.scenario()
     selector = make_selector("knn", scenario.arm(), library.columns(), category=scenario.category)
     starts = make_starts(scenario, scenario.sample_instance("evaluation", 0))
@@ -40,18 +51,18 @@ def test_after_a_failure_the_command_answers_as_lic_2_does(
     np.testing.assert_allclose(answer["start"], chosen.start.x0, atol=1e-9)
     assert answer["estimated_success"] == pytest.approx(chosen.probability)
     # It differs from the best start of LIC-1 away from the failure.
-    code, out, _ = select(
-        capsys, "--goal", "0.6", "0.1", "--method", "knn1", "--json", "--failed", str(START)
-    )
+    code, out, _ = select(capsys, *arguments, "--method", "knn1", "--failed", str(START))
     assert code == 0
     assert json.loads(out)["estimated_success"] != pytest.approx(answer["estimated_success"])
 
 
-def test_a_record_says_all_of_a_failure(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_a_record_says_all_of_a_failure(
+    library: ExperienceLibrary, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     record = START | FINAL | {"outcome": "stuck", "start_x": 0.335, "base_y": 0.0, "after": []}
     path = tmp_path / "record.json"
     path.write_text(json.dumps(record))
-    arguments = ["--goal", "0.6", "0.1", "--method", "knn", "--json"]
+    arguments = [*GOAL, "--library", str(library.path), "--method", "knn", "--json"]
     answers = [
         json.loads(select(capsys, *arguments, "--failed", failed)[1])["start"]
         for failed in (str(path), str(START | FINAL))
@@ -70,9 +81,10 @@ def test_a_record_says_all_of_a_failure(capsys: pytest.CaptureFixture[str], tmp_
     ],
 )
 def test_what_lic_2_cannot_use_is_refused_and_never_dropped(
-    failed: str, message: str, capsys: pytest.CaptureFixture[str]
+    failed: str, message: str, library: ExperienceLibrary, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    code, out, err = select(capsys, "--goal", "0.6", "0.1", "--method", "knn", "--failed", failed)
+    arguments = [*GOAL, "--library", str(library.path), "--method", "knn"]
+    code, out, err = select(capsys, *arguments, "--failed", failed)
     assert code == 2 and out == ""
     assert message in err
 

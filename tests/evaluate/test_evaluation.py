@@ -187,7 +187,7 @@ def test_processes_and_a_cluster_give_the_rows_and_reaches_of_this_process(
     results = []
     with (
         LocalWorkers(2) as processes,
-        dask_cluster(workers=1) as dask,
+        dask_cluster(workers=1, nanny=False) as dask,
         DaskWorkers(dask.address) as cluster,
     ):
         for i, workers in enumerate((None, processes, cluster)):

@@ -14,7 +14,6 @@ from support.mesh_package import write_drake_models
 
 from lic_drake.errors import LicError, RequestError
 from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.paths import shipped_library
 from lic_drake.perception.config import load_cameras
 from lic_drake.perception.observer import Observer
 from lic_drake.reach.request import ReachRequest
@@ -31,8 +30,9 @@ FOLIAGE = load_scenario(
 
 
 @pytest.fixture(scope="module")
-def library() -> ExperienceLibrary:
-    return ExperienceLibrary(shipped_library("cylinder-clutter"))
+def library(tmp_path_factory: pytest.TempPathFactory) -> ExperienceLibrary:
+    scenario = load_scenario("cylinder-clutter")
+    return planar_library(tmp_path_factory.mktemp("cylinders") / "library", scenario)
 
 
 @pytest.fixture(scope="module")

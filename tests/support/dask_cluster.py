@@ -36,18 +36,16 @@ class DaskCluster:
         wait_until(lambda: self._file.exists() and self._file.read_text().endswith("}"))
         self.address = str(json.loads(self._file.read_text())["address"])
 
-    def add_workers(
-        self, count: int, *, threads: int = 1, module: str = "distributed.cli.dask_worker"
-    ) -> Process:
-        """Starts a process with workers in child processes; returns when they have joined."""
+    def add_workers(self, count: int, *, threads: int = 1, nanny: bool = True) -> Process:
+        """Starts workers, which nannies restart; returns when they have joined."""
         from distributed import Client
 
         with Client(self.address, set_as_default=False) as client:
             before = len(client.nthreads())
             process = self._start(
-                *("-m", module, self.address, "--nworkers", str(count)),
+                *("-m", "distributed.cli.dask_worker", self.address, "--nworkers", str(count)),
                 *("--nthreads", str(threads), "--no-dashboard", "--memory-limit", "0"),
-                *("--local-directory", str(self._folder)),
+                *("--local-directory", str(self._folder), "--nanny" if nanny else "--no-nanny"),
             )
             wait_until(lambda: len(client.nthreads()) == before + count)
         return process
@@ -77,13 +75,13 @@ class DaskCluster:
 
 
 @contextmanager
-def dask_cluster(workers: int) -> Iterator[DaskCluster]:
+def dask_cluster(workers: int, nanny: bool = True) -> Iterator[DaskCluster]:
     """Gives a scheduler with some workers."""
     with TemporaryDirectory() as folder:
         cluster = DaskCluster(Path(folder))
         try:
             if workers:
-                cluster.add_workers(workers)
+                cluster.add_workers(workers, nanny=nanny)
             yield cluster
         finally:
             cluster.close()

@@ -80,11 +80,11 @@ def assert_feasible(starts: LineStarts, start: Start) -> None:
 
 @cache
 def _scan(mobile: bool) -> Starts:
-    return scan(ARM, (APERTURES if mobile else LINE).line, 161, 121)
+    return scan(ARM, (APERTURES if mobile else LINE).line, 81, 61)
 
 
 def dense_scan(starts: LineStarts) -> Starts:
-    """Feasible starts 5 mm and 1.5 degrees (0.75 at apertures) apart."""
+    """Feasible starts 10 mm and 3 degrees (1.5 at apertures) apart."""
     poses = _scan(starts.track is not None)
     if starts.track is None or starts.p_WA is None:
         return poses
