@@ -5,6 +5,14 @@ from pathlib import Path
 import pytest
 from support.fake_reach import fill_library
 
+from lic_drake.experience.workers import Workers
+
+
+@pytest.fixture
+def _here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Commands do in this process what they would do in workers, which take seconds to start."""
+    monkeypatch.setattr("lic_drake.experience.workers.LocalWorkers", lambda count: Workers())
+
 
 @pytest.fixture
 def library(tmp_path: Path) -> Path:

@@ -131,6 +131,7 @@ WRONG = [
 ]
 
 
+@pytest.mark.usefixtures("_here")
 @pytest.mark.parametrize(("command", "said"), WRONG)
 def test_a_users_mistake_is_one_line_that_says_what_to_do(
     command: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -5,12 +5,13 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from support.fake_reach import make_request
+from support.fake_reach import make_record, make_request
 
 from lic_drake.cli.main import main
 from lic_drake.experience.collect import REQUEST_FILE, write_request
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
+from lic_drake.reach.scenario import load_scenario
 
 
 def test_info_prints_the_same_numbers_as_text_and_json(
@@ -85,15 +86,16 @@ def test_merge_writes_one_file(
 
 
 def test_recompute_counts_and_names_differences_in_all_rows_if_there_are_few(
-    library: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    # The rows of this library were made up, so simulating them gives others.
-    few = library / "training-000000.parquet"
-    columns = pd.read_parquet(few)["key"]
+    # Rows that were made up, so simulating them gives others.
+    scenario = load_scenario("cylinder-clutter", "{stop: {timeout_s: 0.04}}")
+    records = [make_record(item) for item in make_request(scenario=scenario).reaches(0)]
+    few = ExperienceLibrary(tmp_path).write_shard("few", records, scenario)
     assert main(["experience", "recompute", str(few), "--seed", "1"]) == 1
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].endswith(f"of {len(columns)} rows are identical to the last bit")
-    assert lines[1][:16] in set(columns)
+    assert lines[0].endswith(f"of {len(records)} rows are identical to the last bit")
+    assert lines[1][:16] in {record.key for record in records}
 
 
 HEADER = "success,goal_x,goal_y,start_y,start_phi\n"

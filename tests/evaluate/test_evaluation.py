@@ -37,7 +37,7 @@ def evaluation(tmp_path: Path, **values: Any) -> Evaluation:
     if not (tmp_path / "library").exists():
         planar_library(tmp_path / "library", load_scenario("cylinder-clutter", EASY))
     paths = {"experience": tmp_path / "library", "results": tmp_path / "out"}
-    defaults = {"methods": ("rnd", "gp1"), "environments": 3, "goals": 2}
+    defaults = {"methods": ("rnd", "knn1"), "environments": 3, "goals": 2}
     return Evaluation(**{**paths, **defaults, **values})
 
 
@@ -58,7 +58,7 @@ def test_strategies_are_tried_at_the_same_goals_of_the_same_environments(
     records = {record.key: record for record in asked.reaches.records()}
     scenario = asked.reaches.scenario()
     firsts = [row for row in rows if row.attempt == 1]
-    tried = [(row.environment, row.goal) for row in firsts]  # First gp1's, then RND's.
+    tried = [(row.environment, row.goal) for row in firsts]  # First knn1's, then RND's.
     assert tried == 2 * [(e, g) for e in range(3) for g in (0, 1)]
     for row in rows:
         record = records[row.key]
@@ -66,7 +66,7 @@ def test_strategies_are_tried_at_the_same_goals_of_the_same_environments(
         expected = scenario.sample_goal("evaluation", row.environment, row.goal)
         np.testing.assert_array_equal(record.p_WG, expected)
     # Learned from the library: starts left of the middle succeed.
-    assert all(records[row.key].start_y > 0.0 for row in firsts if row.method == "gp1")
+    assert all(records[row.key].start_y > 0.0 for row in firsts if row.method == "knn1")
     assert any(records[row.key].start_y < 0.0 for row in firsts if row.method == "rnd")
     assert lines[-1].startswith(f"  3/3 environments, {len(rows)} attempts, 0 s left")
 
@@ -155,7 +155,7 @@ def test_the_file_keeps_trials_of_other_variants_and_strategies(
     plain = evaluation(tmp_path, methods=("rnd", "cost"))
     rows = run_evaluation(plain, say=quiet)
     fresh = run_evaluation(replace(plain, fresh=True, variant="fresh"), say=quiet)
-    more = run_evaluation(replace(plain, methods=("gp1",)), say=quiet)
+    more = run_evaluation(replace(plain, methods=("knn1",)), say=quiet)
     # Fewer environments: replaces the trials of the same variant and method.
     fewer = run_evaluation(replace(plain, methods=("rnd",), environments=1), say=quiet)
     expected = [*(row for row in rows if row.method == "cost"), *fresh, *more, *fewer]
@@ -167,7 +167,7 @@ def test_apertures_are_evaluated_with_bases_and_strategies_may_follow_others(
     tmp_path: Path, calls: list[str]
 ) -> None:
     planar_library(tmp_path / "library", load_scenario("cylinder-aperture-clutter", EASY))
-    asked = evaluation(tmp_path, methods=("rnd", "cost", "gp", "rnd>cost"), goals=1)
+    asked = evaluation(tmp_path, methods=("rnd", "cost", "knn", "rnd>cost"), goals=1)
     rows = run_evaluation(asked, say=quiet)
     scenario = asked.reaches.scenario()
     assert len({record.base_y for record in asked.reaches.records()}) > 3
