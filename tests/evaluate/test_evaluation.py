@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.dask_cluster import dask_cluster
 from support.fake_reach import comparable, make_record
 from support.made_up import planar_library, small_cameras, sphere_library
 
@@ -13,7 +12,7 @@ from lic_drake.evaluate import trial as dut
 from lic_drake.evaluate.trial import Evaluation, run_evaluation
 from lic_drake.evaluate.trials import TrialRow, read_trials
 from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.experience.workers import DaskWorkers, LocalWorkers
+from lic_drake.experience.workers import LocalWorkers
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.scenario import load_scenario
 
@@ -180,21 +179,14 @@ def test_apertures_are_evaluated_with_bases_and_strategies_may_follow_others(
     assert firsts["rnd>cost"] == firsts["rnd"] != firsts["cost"]
 
 
-def test_processes_and_a_cluster_give_the_rows_and_reaches_of_this_process(
-    tmp_path: Path,
-) -> None:
-    pytest.importorskip("distributed", reason="Dask is missing: pip install 'lic_drake[cluster]'")
+def test_processes_give_the_rows_and_reaches_of_this_process(tmp_path: Path) -> None:
     results = []
-    with (
-        LocalWorkers(2) as processes,
-        dask_cluster(workers=1, nanny=False) as dask,
-        DaskWorkers(dask.address) as cluster,
-    ):
-        for i, workers in enumerate((None, processes, cluster)):
+    with LocalWorkers(2) as processes:
+        for i, workers in enumerate((None, processes)):
             asked = evaluation(tmp_path, results=tmp_path / str(i), goals=1)
             rows = run_evaluation(asked, workers, quiet)
             results.append((without_times(rows), comparable(asked.reaches.records())))
-    assert results[0] == results[1] == results[2]
+    assert results[0] == results[1]
     assert len(results[0][0]) > 6
     # These were simulated: the longest ends by the time limit.
     assert max(record.duration_s for record in asked.reaches.records()) == pytest.approx(0.2)

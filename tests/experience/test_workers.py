@@ -183,13 +183,14 @@ def test_dask_workers_that_join_later_are_used_and_a_lost_scheduler_loses_no_sha
     pytest.importorskip("distributed", reason=NO_DASK)
     with dask_cluster(workers=0) as dask:
         process = start(library.path, replace(reach, sleep_s=0.1), "--scheduler", dask.address)
+        assert process.stderr is not None
+        waiting = [process.stderr.readline() for _ in range(2)][1]
+        assert "no workers yet, waiting for some; start them with: dask worker tcp" in waiting
         dask.add_workers(1, nanny=False)
         wait_until(lambda: any(library.path.glob("*.parquet")))
         dask.scheduler.kill()
-        error = process.communicate(timeout=60)[1]
+        (lost,) = process.communicate(timeout=60)[1].splitlines()
         assert process.returncode == 2
-        _, waiting, lost = error.splitlines()
-        assert "no workers yet, waiting for some; start them with: dask worker tcp" in waiting
         assert "lost the connection to the scheduler" in lost and "; finished env" in lost
     assert 12 <= collect(library, REQUEST, reach=reach).present < 36
     assert comparable(library.records()) == expected_records(REQUEST)

@@ -3,6 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.made_up import part_of_shipped
 
 from lic_drake.estimate.features import ExperienceRows, FeatureMap
 from lic_drake.experience.store import ExperienceLibrary
@@ -16,11 +17,8 @@ from scripts.cross_validation import run as cross_validation
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two environments of the shipped library of cylinders: 45 goals and 21 starts in each."""
-    shipped = ExperienceLibrary(shipped_library("cylinder-clutter"))
     path = tmp_path_factory.mktemp("few") / "library"
-    records = [record for record in shipped.records() if record.environment < 2]
-    ExperienceLibrary(path).write_shard("few", records, shipped.scenario())
-    return path
+    return part_of_shipped(path, "cylinder-clutter", 2).path
 
 
 def test_choices_of_the_best_score_share_ties() -> None:

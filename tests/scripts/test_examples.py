@@ -4,6 +4,11 @@ import runpy
 from pathlib import Path
 
 import pytest
+import sklearn.ensemble
+from support.made_up import part_of_shipped
+
+import lic_drake
+from lic_drake.paths import shipped_library
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "scripts" / "examples"
 SHOWN = {
@@ -15,11 +20,33 @@ SHOWN = {
     "unknown_category": "first choice",
 }
 
+PARTS = {"cylinder-clutter": 1, "passage-clutter": 20}
+"""Numbers of environments of the shipped libraries that are enough here."""
+
 
 def test_every_example_is_run():
     assert set(SHOWN) == {path.stem for path in EXAMPLES.glob("[a-z]*.py")}
 
 
+@pytest.fixture
+def _quick(tmp_path, monkeypatch):
+    """The examples learn from parts of the libraries, with fewer trees."""
+
+    def part(category):
+        if category not in PARTS:
+            return shipped_library(category)
+        return part_of_shipped(tmp_path / category, category, PARTS[category]).path
+
+    monkeypatch.setattr(lic_drake, "shipped_library", part, raising=False)
+    request = lic_drake.CollectionRequest
+    monkeypatch.setattr(
+        lic_drake, "CollectionRequest", lambda **v: request(**{**v, "environments": 1})
+    )
+    forest = sklearn.ensemble.RandomForestClassifier
+    monkeypatch.setattr(sklearn.ensemble, "RandomForestClassifier", lambda _, **v: forest(5, **v))
+
+
+@pytest.mark.usefixtures("_quick")
 @pytest.mark.parametrize("name", SHOWN)
 def test_it_runs(name, registries_restored, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

@@ -10,7 +10,7 @@ from scripts.second_attempts.run import collect
 
 WALL = (
     "{clutter: {num_movable: 0, num_fixed: 12, lower: [0.4, -0.3], upper: [0.5, 0.3]},"
-    " stop: {timeout_s: 0.4}}"
+    " stop: {timeout_s: 0.1}}"
 )
 
 

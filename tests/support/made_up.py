@@ -1,12 +1,15 @@
-"""Experience that is made up: no reach is simulated."""
+"""Small libraries, made up or parts of the shipped ones: no reach is simulated."""
 
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pyarrow.compute as pc
 
 from lic_drake.experience.collect import REQUEST_FILE, CollectionRequest, write_request
+from lic_drake.experience.schema import read_shard, write_table
 from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.paths import shipped_library
 from lic_drake.reach.scenario import Scenario, load_scenario
 from support.fake_reach import make_record, make_request
 
@@ -22,6 +25,17 @@ def planar_library(path: Path, scenario: Scenario) -> ExperienceLibrary:
         ]
         library.write_shard(f"training-{environment}", records, scenario)
     return library
+
+
+def part_of_shipped(path: Path, category: str, environments: int) -> ExperienceLibrary:
+    """The first environments of a shipped library."""
+    path.mkdir()
+    for shard in ExperienceLibrary(shipped_library(category)).shard_paths():
+        table = read_shard(shard)[1]
+        part = table.filter(pc.field("environment") < environments)
+        if len(part):
+            write_table(part, path / shard.name)
+    return ExperienceLibrary(path)
 
 
 def sphere_library(path: Path) -> ExperienceLibrary:
