@@ -64,13 +64,13 @@ def test_a_session_keeps_a_limited_number_of_diagrams_and_drops_them_all_when_it
     session.diagrams.size = 2
     gc.disable()  # The collector is not left to chance.
     try:
-        for count in range(5):
+        for count in range(4):
             scenario = load_scenario("cylinder-clutter", f"{{clutter: {{num_fixed: {count}}}}}")
             session.run(reach_request(replace(scenario, stop=free_space(0.04).stop)))
         left = sum(reference() is not None for reference in built)
     finally:
         gc.enable()
-    assert len(built) == 5 * len(ONE_DIAGRAM)
+    assert len(built) == 4 * len(ONE_DIAGRAM)
     assert left <= 2 * len(ONE_DIAGRAM)
     session.clear()
     assert alive(built) == []

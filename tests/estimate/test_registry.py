@@ -44,6 +44,6 @@ def test_every_estimator_learns_a_known_surface(world, name: str) -> None:
     ],
 )
 def test_luck_shared_within_environments_is_not_read_as_surface(world, name, caution) -> None:
-    library = type(world)(relief=0.3).library(environments=8, shared_luck=0.4)
+    library = type(world)(relief=0.3).library(environments=5, shared_luck=0.4)
     knowing = make_estimator(name).fit(library.X, library.y, library.groups)
     assert caution(knowing) > caution(make_estimator(name).fit(library.X, library.y))

@@ -179,10 +179,10 @@ def test_apertures_are_evaluated_with_bases_and_strategies_may_follow_others(
     assert firsts["rnd>cost"] == firsts["rnd"] != firsts["cost"]
 
 
-def test_processes_give_the_rows_and_reaches_of_this_process(tmp_path: Path) -> None:
+def test_a_worker_process_gives_the_rows_and_reaches_of_this_process(tmp_path: Path) -> None:
     results = []
-    with LocalWorkers(2) as processes:
-        for i, workers in enumerate((None, processes)):
+    with LocalWorkers(1) as process:
+        for i, workers in enumerate((None, process)):
             asked = evaluation(tmp_path, results=tmp_path / str(i), goals=1)
             rows = run_evaluation(asked, workers, quiet)
             results.append((without_times(rows), comparable(asked.reaches.records())))

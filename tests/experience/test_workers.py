@@ -132,14 +132,17 @@ def test_of_two_concurrent_collections_the_second_is_rejected(
 
 
 def test_shares_of_a_job_array_fill_one_library_concurrently(
-    library: ExperienceLibrary, reach: FakeReach, start: Start
+    tmp_path: Path, library: ExperienceLibrary, reach: FakeReach, start: Start
 ) -> None:
-    slow = replace(reach, sleep_s=0.05)
-    shares = [start(library.path, slow, "--workers", "1", "--share", f"{k}/2") for k in (1, 2)]
-    errors = [process.communicate(timeout=60)[1] for process in shares]
-    for error, count in zip(errors, (2, 1), strict=True):
-        assert f"{count} environments x 4 goals x 3 starts, {12 * count} reaches" in error
-        assert "lic: " not in error
+    hold = tmp_path / "hold"
+    hold.touch()
+    first = start(library.path, replace(reach, hold=hold), "--workers", "1", "--share", "1/2")
+    wait_until(lambda: any(library.path.glob("*.yaml")))
+    # The second is done before the first has begun a reach.
+    assert collect(library, REQUEST, reach=reach, share="2/2").done == 12
+    hold.unlink()
+    error = first.communicate(timeout=60)[1]
+    assert "2 environments x 4 goals x 3 starts, 24 reaches" in error and "lic: " not in error
     assert comparable(library.records()) == expected_records(REQUEST)
     assert len(reach.calls()) == 36 and len(reach.processes()) == 2
 

@@ -83,7 +83,7 @@ def test_chains_are_the_same_in_another_process(sleep: bool) -> None:
 def test_many_bases_and_histories_of_an_environment_do_not_mix(session: ReachSession) -> None:
     session.environments.size, session.ends.size = 2, 1
     shorter = small_clutter(0.2)
-    chain = [replace(request, scenario=shorter) for request in CHAIN]
+    chain = [replace(request, scenario=shorter) for request in CHAIN[1:]]
     chain.append(from_base(0.02, shorter))
     expected = [ReachSession(session.sleep).run(request) for request in chain]
     again = [session.run(request) for request in [*chain, *reversed(chain)]]

@@ -6,11 +6,12 @@ from support.fake_reach import make_record, make_request
 from lic_drake.experience.pairs import pair_second_attempts
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.scenario import load_scenario
+from lic_drake.starts import make_starts
 from scripts.second_attempts.run import collect
 
 WALL = (
     "{clutter: {num_movable: 0, num_fixed: 12, lower: [0.4, -0.3], upper: [0.5, 0.3]},"
-    " stop: {timeout_s: 0.1}}"
+    " stop: {timeout_s: 0.1}, task: {start_line: {phi_step_deg: 60.0}}}"
 )
 
 
@@ -28,7 +29,8 @@ def test_every_start_follows_each_failure_and_nothing_is_simulated_twice(
     firsts = [record for record in records if not record.after]
     assert len(firsts) == 2
     assert all(record.outcome == "timeout" for record in firsts)
-    assert count == 2 * 21 == len(records) - len(firsts)
+    starts = make_starts(scenario, scenario.sample_instance("training", 5)).grid
+    assert count == 2 * len(starts) == len(records) - len(firsts)
     pairs = pair_second_attempts(output.columns())
     assert set(pairs["environment"]) == {5, 6}
     assert np.all(np.isfinite(pairs["first_final_y"]))

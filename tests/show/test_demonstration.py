@@ -25,7 +25,7 @@ from lic_drake.show.demonstration import demonstrate
 PNG = b"\x89PNG"
 FOLIAGE = load_scenario(
     "foliage-aperture-clutter",
-    "{stop: {timeout_s: 0.2}, clutter: {num_stems: 3, num_branches: 1}}",
+    "{stop: {timeout_s: 0.2}, clutter: {num_stems: 1, num_branches: 1}}",
 )
 
 

@@ -6,20 +6,21 @@ from pathlib import Path
 
 import pytest
 from support.browser import assert_shows_a_scene, visit
+from support.made_up import planar_library
 
 from lic_drake.cli.main import main
-from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
+from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.session import run_reach
 from lic_drake.show.gallery import HEADS, Exhibit, choose_exhibits, make_gallery, numbers_of
 from lic_drake.show.page import embed, make_page, pack, picture
 
 
 @pytest.fixture(scope="module")
-def exhibits() -> list[Exhibit]:
-    return choose_exhibits(
-        ExperienceLibrary(shipped_library("passage-clutter")), "cost", say=lambda line: None
-    )
+def exhibits(tmp_path_factory: pytest.TempPathFactory) -> list[Exhibit]:
+    scenario = load_scenario("passage-clutter", "{stop: {timeout_s: 7.0}}")
+    library = planar_library(tmp_path_factory.mktemp("passages") / "library", scenario)
+    return choose_exhibits(library, "cost", say=lambda line: None)
 
 
 def test_a_success_and_a_failure_are_shown_and_none_is_left_out_before_them(

@@ -42,7 +42,7 @@ def sphere_library(path: Path) -> ExperienceLibrary:
     """A library of short reaches of the PR2: those from apertures near the goal succeed."""
     scenario = load_scenario("sphere-aperture-clutter", "{stop: {timeout_s: 0.2}}")
     library = ExperienceLibrary(path)
-    request = CollectionRequest(scenario=scenario, environments=2, max_goals=3)
+    request = CollectionRequest(scenario=scenario, environments=1, max_goals=4)
     for environment in request.environment_indices:
         records = []
         for item in request.reaches(environment):
