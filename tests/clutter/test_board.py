@@ -78,13 +78,13 @@ def test_a_board_is_closed_but_for_its_open_apertures(
 
 def test_what_is_blocked_is_random_and_leaves_the_spheres_as_they_are() -> None:
     blocked = replace(SHIPPED, num_blocked=15)
-    opened = np.array([sample(blocked, index).p_WA for index in range(200)])
-    assert opened.shape == (200, 5, 3)
+    opened = np.array([sample(blocked, index).p_WA for index in range(100)])
+    assert opened.shape == (100, 5, 3)
     centres = SHIPPED.aperture_centres()[:, None, None]
     counts = np.all(np.isclose(opened, centres), axis=3).sum(axis=(1, 2))
-    assert counts.sum() == 1000
-    assert counts.min() >= 25  # 50 expected, standard deviation 6.1.
-    assert counts.max() <= 75
+    assert counts.sum() == 500
+    assert counts.min() >= 8  # 25 expected, standard deviation 4.3.
+    assert counts.max() <= 42
     np.testing.assert_array_equal(sample(blocked).p_WO[:40], sample(SHIPPED).p_WO[:40])
 
 

@@ -12,6 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pydrake.multibody.plant import MultibodyPlant
 
+from lic_drake.cli.main import main
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.estimate.registry import make_estimator
 from lic_drake.experience.collect import CollectionRequest
@@ -134,30 +135,23 @@ def test_boosting_without_failures_expects_none(extend: Extensions) -> None:
 
 
 def test_the_command_line_collects_learns_and_selects_with_all_three(
-    environment: dict[str, str], tmp_path: Path
+    environment: dict[str, str],
+    extend: Extensions,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    def lic(*arguments: str) -> str:
-        result = subprocess.run(
-            [sys.executable, "-m", "lic_drake", *arguments],
-            capture_output=True,
-            text=True,
-            env=environment,
-            cwd=tmp_path,
-        )
-        assert result.returncode == 0, result.stderr
-        return result.stdout
-
+    library = str(tmp_path / "library")
     limits = ("--environments", "1", "--max-goals", "3", "--max-starts", "2", "--workers", "1")
     fewer = "{clutter: {num_boxes: 2}, stop: {timeout_s: 5}}"
     scenario = ("--scenario", str(SCENARIO), "--set", fewer)
-    lic("collect", "library", *scenario, *limits)
-    records = ExperienceLibrary(tmp_path / "library").records()
+    command = [sys.executable, "-m", "lic_drake", "collect", library, *scenario, *limits]
+    subprocess.run(command, capture_output=True, check=True, env=environment)
+    records = ExperienceLibrary(library).records()
     assert {(r.category, r.robot) for r in records} == {("shelf-clutter", "long-arm")}
     assert 0 < sum(record.success for record in records) < len(records) == 6
-    chosen = json.loads(
-        lic("select", "--library", "library", *("--goal", "0.6", "0.2"), "--json",
-            "--method", "boosting")
-    )  # fmt: skip
+    select = "select --goal 0.6 0.2 --method boosting --json --library"
+    assert main([*select.split(), library]) == 0
+    chosen = json.loads(capsys.readouterr().out)
     assert chosen["method"] == "boosting"
     assert 0.0 <= chosen["estimated_success"] <= 1.0
     assert chosen["start"][0] == 0.335
