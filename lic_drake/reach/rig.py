@@ -1,8 +1,9 @@
 """The context of a reach diagram, and how it gets from one control instant to the next.
 
 CENIC solves three times a step to know its error, which impacts need. An arm that creeps along an
-object does not: `Stepper` first makes a few fixed steps of CENIC, one solve each. If the skin feels
-a rising force at their end, it simulates the period again from its beginning, with error control.
+object does not: `Stepper` first makes a few fixed steps of CENIC, one solve each. If the force on
+the skin has changed at their end, because something was hit or has slipped, it simulates the period
+again from its beginning, with error control.
 """
 
 from collections import Counter
@@ -117,7 +118,7 @@ class Stepper:
         self._fix(period_s / self._steps(period_s * float(np.abs(v) @ rig.scene.robot.levers)))
         try:
             self._simulator.AdvanceTo(time_s)
-            if rig.taxel_force().sum() <= force + config.calm_rise_N:
+            if abs(rig.taxel_force().sum() - force) <= config.calm_change_N:
                 return
         except RuntimeError:
             pass

@@ -27,7 +27,7 @@ from lic_drake.types import Vector
 
 _LATER_FIELDS = frozenset(
     "random_goals base torso_m stand progress_m progress_time_s deadzone_m drag_N_s_per_m"
-    " taxels_per_m calm_move_m calm_rise_N".split()
+    " taxels_per_m calm_move_m calm_change_N".split()
 )
 """Fields that digests leave out at their defaults: the first libraries are older than they are."""
 

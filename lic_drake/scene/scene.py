@@ -40,11 +40,11 @@ class SceneConfig:
     # appears as a single force of hundreds of newtons.
     cenic_accuracy: float = 1e-4
     cenic_max_step_s: float = 0.01
-    # While the arm moves less than this in a control period, metres, a reach needs a single step of
-    # CENIC for it (twice as far: two steps, beyond: four), unless the total force on the skin rises
-    # by more than the second value, N. 0: always error control.
+    # A control period in which the arm moves less than this, metres, is made in a single step (twice
+    # as far: two steps, beyond: four) without error control, unless the total force on the skin
+    # changes by more than the second value, N. 0: always error control.
     calm_move_m: float = 0.0
-    calm_rise_N: float = 1.0
+    calm_change_N: float = 0.15
     # Contact approximation of a discrete plant.
     contact_approximation: str = "lagged"
     # Dry friction of a movable object on the ground, N (authors' simulator), and the speed at which
@@ -67,10 +67,10 @@ class SceneConfig:
                 "contact_approximation must be one of sap, similar, lagged,"
                 f" got {self.contact_approximation!r}"
             )
-        names = "cenic_accuracy cenic_max_step_s ground_friction_N ground_creep_m_per_s calm_rise_N"
+        names = "cenic_accuracy cenic_max_step_s ground_friction_N ground_creep_m_per_s"
         check_numbers(
             self,
-            positive=[*names.split(), "drag_N_s_per_m", "taxels_per_m"],
+            positive=[*names.split(), "drag_N_s_per_m", "taxels_per_m", "calm_change_N"],
             non_negative=["calm_move_m"],
         )
 

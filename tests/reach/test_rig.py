@@ -49,8 +49,8 @@ def test_in_free_space_four_single_solves_a_period_are_as_good_as_error_control(
 
 def test_an_impact_is_simulated_again_with_error_control() -> None:
     chosen, calm = reach(True, calm_move_m=0.0), reach(True, calm_move_m=0.004)
-    careless = reach(True, calm_move_m=0.004, calm_rise_N=1e6)
-    assert calm.statistics["repeated"] == 1
+    careless = reach(True, calm_move_m=0.004, calm_change_N=1e6)
+    assert 1 <= calm.statistics["repeated"] < 0.1 * calm.statistics["periods"]
     assert careless.statistics["repeated"] == 0
     peak = max(chosen.peak_force)
     assert max(calm.peak_force) == pytest.approx(peak, rel=0.01)
