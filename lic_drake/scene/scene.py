@@ -40,8 +40,8 @@ class SceneConfig:
     # appears as a single force of hundreds of newtons.
     cenic_accuracy: float = 1e-4
     cenic_max_step_s: float = 0.01
-    # A control period in which the arm moves less than this, metres, is made in a single step (twice
-    # as far: two steps, beyond: four) without error control, unless the total force on the skin
+    # A control period in which the arm moves less than this, metres, is one step without error
+    # control (up to twice as far: two steps, beyond: four), unless the total force on the skin
     # changes by more than the second value, N. 0: always error control.
     calm_move_m: float = 0.0
     calm_change_N: float = 0.15
