@@ -44,7 +44,7 @@ class SceneConfig:
     # control (up to twice as far: two steps, beyond: four), unless the total force on the skin
     # changes by more than the second value, N. 0: always error control.
     calm_move_m: float = 0.0
-    calm_change_N: float = 0.15
+    calm_change_N: float = 0.3
     # Contact approximation of a discrete plant.
     contact_approximation: str = "lagged"
     # Dry friction of a movable object on the ground, N (authors' simulator), and the speed at which
