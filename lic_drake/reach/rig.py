@@ -121,7 +121,7 @@ class Stepper:
             if abs(rig.taxel_force().sum() - force) <= config.calm_change_N:
                 return
         except RuntimeError:
-            pass
+            pass  # No solution with so long steps; shorter ones may have one.
         self._periods = self.statistics() + Counter(repeated=1)
         rig.restore(before)
         self._fix(0.0)
@@ -129,7 +129,11 @@ class Stepper:
         self._simulator.AdvanceTo(time_s)
 
     def statistics(self) -> Counter[str]:
-        """Returns how often CENIC did what, and how many control periods were simulated again."""
+        """Returns how often CENIC did what.
+
+        "periods": control periods tried with fixed steps; "repeated": those simulated again;
+        "steps", "shrunk" ones among them, "iterations" and "factorizations" of its solver.
+        """
         counts = self._periods.copy()
         if self._config.time_step_s == 0.0:
             for name, value in self._simulator.get_integrator().GetStatisticsSummary():

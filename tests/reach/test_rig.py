@@ -8,7 +8,8 @@ from support.worlds import cylinder, make_clutter
 from lic_drake.reach.diagram import make_reach_diagram
 from lic_drake.reach.environment import Environment
 from lic_drake.reach.rig import Rig, Stepper
-from lic_drake.reach.scenario import Scenario
+from lic_drake.reach.scenario import Scenario, load_scenario
+from lic_drake.reach.sleeping import SkinAxes
 from lic_drake.reach.trace import ReachTrace
 
 P_WG = np.array([0.75, 0.1, 0.0])
@@ -77,3 +78,14 @@ def test_a_rig_that_goes_back_takes_the_same_way_again(calm_move_m: float) -> No
     np.testing.assert_array_equal(ends[0].held, ends[1].held)
     assert ends[0].time_s == ends[1].time_s == pytest.approx(0.6)
     assert np.abs(ends[0].x - instant.x).max() > 1e-3
+
+
+@pytest.mark.parametrize("name", ["cylinder-clutter", "sphere-aperture-clutter"])
+def test_no_part_of_the_skin_moves_faster_than_joint_speeds_times_levers(name: str) -> None:
+    arm = load_scenario(name).arm()
+    axes, rng, share = SkinAxes(arm, 2 if arm.is_planar else 3), np.random.default_rng(3), []
+    for q in rng.uniform(arm.q_min, arm.q_max, (200, arm.num_joints)):
+        turn = 1e-4 * rng.normal(size=arm.num_joints)
+        moved = np.linalg.norm(axes.ends(q + turn) - axes.ends(q), axis=1).max()
+        share.append(moved / (np.abs(turn) @ arm.levers))
+    assert 0.5 < max(share) <= 1.0
