@@ -93,25 +93,36 @@ class MpcConfig:
         return 1.0 / self.rate_hz
 
 
+_IJRR_2013 = partial(
+    MpcConfig,
+    rate_hz=100.0,
+    force_trim_N=0.5,
+    tip_step_m=0.0005,
+    slow_distance_m=0.0,
+    torque_change_weight=1e-5,
+    force_weight=1.0,
+    force_weight_shared=False,
+    force_decrease_N=0.2,
+    fall_below_N=0.1,
+    rise_over_N=-0.01,
+    max_change_deg=np.inf,
+    max_windup_deg=np.inf,
+    reset_windup_deg=np.inf,
+    equilibrium_in_limits=False,
+    forgive_joint_limits=False,
+)
+
 PRESETS: dict[str, Callable[[], MpcConfig]] = {
     "haptic_mpc_2013": MpcConfig,
-    "ijrr_2013": partial(
-        MpcConfig,
-        rate_hz=100.0,
-        force_trim_N=0.5,
-        tip_step_m=0.0005,
-        slow_distance_m=0.0,
-        torque_change_weight=1e-5,
-        force_weight=1.0,
-        force_weight_shared=False,
-        force_decrease_N=0.2,
-        fall_below_N=0.1,
-        rise_over_N=-0.01,
-        max_change_deg=np.inf,
-        max_windup_deg=np.inf,
-        reset_windup_deg=np.inf,
-        equilibrium_in_limits=False,
-        forgive_joint_limits=False,
+    "ijrr_2013": _IJRR_2013,
+    "ijrr_2013_25hz": partial(
+        _IJRR_2013,
+        rate_hz=25.0,
+        tip_step_m=0.002,
+        force_decrease_N=0.8,
+        rise_below_N=0.4,
+        fall_below_N=0.4,
+        rise_over_N=-0.04,
     ),
     "pr2": partial(
         MpcConfig,
@@ -126,8 +137,9 @@ PRESETS: dict[str, Callable[[], MpcConfig]] = {
 """The published parameter sets by name.
 
 haptic_mpc_2013 is the later controller, 25 Hz, up to 0.5 m/s (hrl_haptic_mpc, simulated 3 links);
-ijrr_2013 the one of the paper's reference [1], 100 Hz, 0.05 m/s; pr2 the later one with its values
-for the PR2 (3 N: paper V-A).
+ijrr_2013 the one of the paper's reference [1], 100 Hz, 0.05 m/s; ijrr_2013_25hz the same per second in
+four times longer steps (notebooks/results/calibration); pr2 the later one with its values for the
+PR2 (3 N: paper V-A).
 """
 
 
