@@ -23,12 +23,9 @@ CORNERS = 0.5 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 def apertures_figure(
     selector: LicSelector, starts: BoardStarts, attempts: Sequence[Attempt]
 ) -> Figure:
-    """Returns a map of a known board before each attempt.
+    """Returns a map of a known board, as a selector estimates it, before each attempt of a trial.
 
-    Args:
-        selector: Whose estimates to draw; the attempts may be another strategy's.
-        starts: The feasible starts.
-        attempts: The attempts, all but the last one failures.
+    The attempts may be another strategy's.
     """
 
     def draw(ax: Axes, number: int) -> None:
@@ -42,13 +39,9 @@ def apertures_figure(
 
 
 def estimate_apertures(objective: SuccessObjective, starts: BoardStarts) -> Vector:
-    """Returns the highest estimate over base and torso at each open aperture, shape (k,).
+    """Returns the highest estimate over base and torso at each open aperture, `starts.p_WA`.
 
     It includes the probability that the aperture is open. NaN where there is no feasible start.
-
-    Args:
-        objective: What is estimated.
-        starts: The feasible starts; the apertures are `starts.p_WA`.
     """
     values = np.clip(objective.values(starts.grid), 0.0, 1.0) * starts.chance(starts.grid.x0)
     best = np.full(len(starts.p_WA), np.nan)
@@ -73,12 +66,7 @@ def draw_aperture_map(
 ) -> Axes:
     """Draws the board's open apertures as the robot sees them: its left is on the left.
 
-    Args:
-        ax: Where to draw.
-        starts: Gives the board and its open apertures.
-        probability: Estimates for the open ones, shape (k,).
-        p_WG: Goal, shape (3,), metres.
-        chosen: Index of an open aperture that gets a frame.
+    `probability` is what `estimate_apertures` returns; the aperture of index `chosen` is framed.
     """
     edge = starts.board.aperture_m
     outlines = starts.p_WA[:, np.newaxis, 1:] + edge * CORNERS
@@ -94,14 +82,9 @@ def draw_aperture_map(
 def draw_probabilities(
     ax: Axes, outlines: Vector, probability: Vector, chosen: int | None = None
 ) -> None:
-    """Fills apertures: the brighter, the more likely a reach through them succeeds.
+    """Fills apertures, outlines of shape (n, 4, 2): the brighter, the likelier is success.
 
-    Args:
-        ax: Where to draw.
-        outlines: Their corners in the axes' coordinates, shape (n, 4, 2).
-        probability: Estimated probability of success, shape (n,); NaN, drawn as 0 without a
-            number, where the arm cannot reach through.
-        chosen: Index of an aperture that gets a frame.
+    A NaN, where the arm cannot reach through, is drawn as 0 without a number.
     """
     for outline, value in zip(outlines, probability, strict=True):
         shade = colormaps["gray"](np.nan_to_num(value))

@@ -35,12 +35,7 @@ class Approach:
     """
 
     def __init__(self, scenario: Scenario, instance: ClutterInstance) -> None:
-        """Builds the collision checker.
-
-        Args:
-            scenario: Robot and contact.
-            instance: The environment.
-        """
+        """Builds the collision checker."""
         self.waiting = np.deg2rad(WAITING_DEG)
         self._arm = scenario.arm()
         self._checker = CollisionChecker(self._arm, instance, scenario.scene)
@@ -50,10 +45,6 @@ class Approach:
 
         Its last part is straight for the tool. Where no free path is found, for instance because
         the start lies in a pocket, the arm moves straight in joint space.
-
-        Args:
-            b0: Base position and torso height, shape (3,), metres.
-            q_start: Joint angles at the start, shape (7,), radians.
         """
         way_in = self._retreat(b0, q_start)[::-1]
         begin, end = self.waiting, way_in[0]

@@ -36,8 +36,6 @@ class Demonstration:
     """What was done and written.
 
     Attributes:
-        p_WG: Goal, shape (3,), metres.
-        attempts: The attempts in their order.
         success: Whether the last attempt reached the goal, or with cameras the ball.
         files: What was written, by kind: recording, pictures and data.
     """
@@ -64,13 +62,13 @@ def demonstrate(
     Args:
         scenario: The library's scenario, or another one with the same robot.
         library: Experience to learn from; its environments come from another seed stream.
-        method: Strategy, see `lic_drake.select.registry.method_names`.
+        method: Strategy, see `lic_drake.select.registry.check_method`.
         seed: Chooses the environment and the goal.
         out: Folder for demo.html, demo.json and the files of
             `lic_drake.show.pictures.save_pictures`; those of an earlier demonstration are removed.
         attempts: Largest number of reaches.
         say: Receives progress messages.
-        drake_models: Folder of package://drake_models, to show a PR2 in its meshes.
+        drake_models: See `lic_drake.show.stage.add_stage`.
         cameras: Cameras with which a PR2 detects apertures and goal before every attempt; by
             default both are known.
 

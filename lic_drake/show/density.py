@@ -26,12 +26,9 @@ DENSITY_SHAPE = (81, 91)
 def densities_figure(
     selector: LicSelector, starts: LineStarts, attempts: Sequence[Attempt]
 ) -> Figure:
-    """Returns the estimates over all starts before each attempt.
+    """Returns the estimates of a selector over all starts before each attempt of a trial.
 
-    Args:
-        selector: Whose estimates to draw; the attempts may be another strategy's.
-        starts: The feasible starts.
-        attempts: The attempts, all but the last one failures.
+    The attempts may be another strategy's.
     """
 
     def draw(ax: Axes, number: int) -> None:
@@ -49,11 +46,7 @@ def density_lattice(starts: LineStarts, region: Region) -> Starts:
     """Returns a lattice of starts over a start line, feasible or not; phi varies fastest.
 
     Where the base moves, the hand is in the centre of an aperture and the base varies; relative to
-    the base these are the same poses.
-
-    Args:
-        starts: The feasible starts.
-        region: One of their regions: the line, or an aperture.
+    the base these are the same poses. `region` is the line, or an aperture.
     """
     line = starts.line
     y = np.linspace(line.lower[1], line.upper[1], DENSITY_SHAPE[0])
@@ -78,14 +71,9 @@ def estimate_density(selector: LicSelector, situation: Situation, lattice: Start
 def draw_density(
     ax: Axes, lattice: Starts, probability: Vector, chosen: Start, number: int = 1
 ) -> Axes:
-    """Draws estimates over a lattice of starts.
+    """Draws estimates over the n starts of a `density_lattice`, and the start that was selected.
 
-    Args:
-        ax: Where to draw.
-        lattice: As `density_lattice` returns it, n starts.
-        probability: Estimates there, shape (n,); NaN where the arm cannot start.
-        chosen: The start that was selected.
-        number: Number of the attempt from it.
+    `probability` has shape (n,), NaN where the arm cannot start; `number` is that of the attempt.
     """
     y, phi = (lattice.in_R[:, k].reshape(DENSITY_SHAPE) for k in (1, 2))
     values = probability.reshape(DENSITY_SHAPE)

@@ -26,12 +26,9 @@ STATE_COLORS = {"open": "tab:green", "partly": "gold", "blocked": "tab:red", "un
 
 
 def maps_figure(selector: LicSelector, observer: Observer, attempts: Sequence[Attempt]) -> Figure:
-    """Returns the passable-probability maps before all attempts.
+    """Returns the passable-probability maps of a selector before all attempts of a trial.
 
-    Args:
-        selector: Whose estimates to draw; the attempts may be another strategy's.
-        observer: What the robot saw before each attempt.
-        attempts: The attempts, all but the last one failures.
+    The attempts may be another strategy's.
     """
     return attempts_figure(
         len(attempts), 6.0, lambda ax, number: _draw_map(ax, selector, observer, attempts, number)

@@ -24,15 +24,9 @@ ATTEMPT_COLORS = ("tab:blue", "tab:purple", "tab:green", "tab:olive", "tab:cyan"
 
 
 def save_figure(figure: Figure, path: Path, margins: bool = True) -> None:
-    """Writes a figure at 150 dots per inch.
+    """Writes a figure at 150 dots per inch, with `margins` cropped to small ones.
 
-    Args:
-        figure: The figure.
-        path: The file; its ending gives the format.
-        margins: Whether to crop it to what is drawn, with small margins.
-
-    Raises:
-        LicError: The file cannot be written.
+    The ending gives the format. Raises a LicError if the file cannot be written.
     """
     try:
         with readable_errors(path, "write"):
@@ -43,15 +37,7 @@ def save_figure(figure: Figure, path: Path, margins: bool = True) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class ShownTrial:
-    """A trial and what is needed to draw it.
-
-    Attributes:
-        scenario: Robot and task.
-        instance: The environment.
-        p_WG: The goal, shape (3,), metres.
-        attempts: The attempts, all but the last one failures.
-        traces: Their samples with their states.
-    """
+    """A trial and what is needed to draw it: `traces` are of its attempts, with their states."""
 
     scenario: Scenario
     instance: ClutterInstance
@@ -69,13 +55,7 @@ class ShownTrial:
 
 
 def attempts_figure(num_attempts: int, width: float, draw: Callable[[Axes, int], None]) -> Figure:
-    """Returns a figure with a panel for each attempt.
-
-    Args:
-        num_attempts: Number of attempts.
-        width: Width of a panel, inches.
-        draw: Draws the panel of an attempt, from 1.
-    """
+    """Returns a figure with a panel, `width` inches wide, for each attempt, counted from 1."""
     figure = Figure(figsize=(width * num_attempts, 4.8), layout="constrained")
     for i, ax in enumerate(figure.subplots(1, num_attempts, squeeze=False)[0]):
         draw(ax, i + 1)

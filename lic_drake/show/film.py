@@ -45,15 +45,7 @@ def film_frames(trial: ShownTrial, cameras: CamerasConfig) -> Iterator[NDArray[n
 
 
 def save_film(frames: Iterable[NDArray[np.uint8]], path: Path) -> None:
-    """Writes an animated WebP picture, which browsers play in a loop.
-
-    Args:
-        frames: At least one, each of shape (height, width, 3).
-        path: The file.
-
-    Raises:
-        LicError: It cannot be written.
-    """
+    """Writes an animated WebP picture of one or more frames, which browsers play in a loop."""
     first, *others = [Image.fromarray(frame) for frame in frames]
     duration = round(1000.0 / (SPEED * FRAMES_PER_SECOND))
     options = {"save_all": True, "append_images": others, "duration": duration, "loop": 0}

@@ -55,13 +55,9 @@ th, td { padding: 0.2rem 0.8rem 0.2rem 0; text-align: right; border-bottom: 1px 
 
 @dataclass(frozen=True, kw_only=True)
 class Exhibit:
-    """A trial of the gallery.
+    """A trial of the gallery, in an environment of the stream `STREAM`.
 
     Attributes:
-        scenario: Its scenario.
-        environment: Index of the environment in the stream `STREAM`.
-        p_WG: Goal, shape (3,), metres.
-        attempts: The attempts in their order.
         recording: All attempts as a page that plays offline.
         view: View from above with all attempts, a PNG image.
     """
@@ -93,13 +89,10 @@ def choose_exhibits(
 
     Args:
         library: Experience to learn from; it gives the scenario.
-        method: Strategy, see `lic_drake.select.registry.method_names`.
+        method: Strategy, see `lic_drake.select.registry.check_method`.
         each: Number of successes, and of failures.
         first_environment: Index of the environment to begin with.
         say: Receives a message for every exhibit.
-
-    Raises:
-        LicError: The method or the library cannot be used.
     """
     scenario = library.scenario()
     selector = make_selector(
@@ -147,12 +140,7 @@ def _exhibit(scenario: Scenario, environment: int, p_WG: Vector, done: list[Atte
 
 
 def make_gallery(exhibits: Sequence[Exhibit], method: str) -> str:
-    """Returns the page; opened at `#<category>-<environment>` it plays that recording at once.
-
-    Args:
-        exhibits: What to show, in this order.
-        method: Strategy that selected the starts.
-    """
+    """Returns the page; opened at `#<category>-<environment>` it plays that recording at once."""
     parts = [
         f"<p>Starts selected by {html.escape(label(method))} in environments that are in no"
         " experience library: for each category the first environments in which the goal was"

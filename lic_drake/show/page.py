@@ -23,13 +23,7 @@ figcaption, footer { color: #555; font-size: 0.9rem; }
 
 
 def make_page(title: str, body: str, style: str = "") -> str:
-    """Returns a page.
-
-    Args:
-        title: Its title and heading, plain text.
-        body: HTML.
-        style: CSS in addition to that of all pages.
-    """
+    """Returns a page of a plain-text title, HTML, and CSS in addition to that of all pages."""
     heading = html.escape(title)
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
@@ -40,13 +34,10 @@ def make_page(title: str, body: str, style: str = "") -> str:
 
 
 def picture(data: bytes, kind: str, caption: str = "", alt: str = "") -> str:
-    """Returns an image as HTML, with a caption unless that is empty.
+    """Returns the content of an image file as HTML, with a caption unless that is empty.
 
-    Args:
-        data: The file's content.
-        kind: Its media type, for instance "image/png".
-        caption: Plain text.
-        alt: Plain text for readers who do not see it; the caption by default.
+    `kind` is its media type, such as "image/png", `alt` is for readers who do not see it, by
+    default the caption; both texts are plain.
     """
     source = f"data:{kind};base64,{base64.b64encode(data).decode('ascii')}"
     image = f'<img alt="{html.escape(alt or caption)}" src="{source}">'
@@ -66,12 +57,8 @@ def pack(page: str) -> str:
 def embed(page: str, title: str = "recording", height_px: int = 480, button: str = "") -> str:
     """Returns a frame that shows a page, as HTML, for other pages and notebooks.
 
-    Args:
-        page: The page.
-        title: What it is, plain text.
-        height_px: Height of the frame.
-        button: Label of a button; the page is then shown only once that is pressed, or when the
-            address ends with `#` and the id of the section that holds the frame.
+    With a `button` of that label, the page is shown only once that is pressed, or when the address
+    ends with `#` and the id of the section that holds the frame.
     """
     packed = pack(page)
     name = "recording-" + hashlib.sha256(packed.encode()).hexdigest()[:12]

@@ -43,7 +43,8 @@ def save_pictures(
     """Writes demo.html, path.png and the stills of `lic_drake.show.stills.save_stills`.
 
     In the plane also density.png, in front of a board apertures.png, and with cameras look1.png and
-    so on, views.webp (a film of both cameras) and sequence.html (all of it on one page).
+    so on, views.webp (a film of both cameras) and sequence.html (all of it on one page). Returns
+    the files by kind; a LicError says which cannot be written.
 
     Args:
         trial: What to show.
@@ -51,13 +52,7 @@ def save_pictures(
         known: What the robot observed, or the feasible starts if it knows them.
         out: The folder.
         say: Receives a warning if stills cannot be rendered.
-        drake_models: Folder of package://drake_models, to show a PR2 in its meshes.
-
-    Returns:
-        The files by kind.
-
-    Raises:
-        LicError: A file cannot be written.
+        drake_models: See `lic_drake.show.stage.add_stage`.
     """
     attempts = trial.attempts
     recording = record_trial(trial, drake_models)

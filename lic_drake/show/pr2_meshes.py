@@ -49,11 +49,8 @@ def find_drake_models() -> Path:
 def attach_pr2_meshes(scene: Scene, package: Path) -> None:
     """Attaches visual-only meshes in place of the links' shapes; collision geometry is unchanged.
 
-    Gripper closed and head level, as in models/pr2/pr2.urdf.
-
-    Args:
-        scene: A scene with a PR2, not yet built into a diagram.
-        package: The folder of package://drake_models.
+    Gripper closed and head level, as in models/pr2/pr2.urdf. The scene must not be built into a
+    diagram yet; `package` is the folder of package://drake_models.
 
     Raises:
         ModelError: The package has no PR2, or one that cannot be read.

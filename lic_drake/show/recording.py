@@ -69,9 +69,9 @@ class Recording:
         """Starts a recording.
 
         Args:
-            scenario: Robot, task and control rate.
+            scenario: Gives robot, task and control rate.
             instance: The environment.
-            drake_models: Folder of package://drake_models, to show a PR2 in its meshes.
+            drake_models: See `lic_drake.show.stage.add_stage`.
             approach: Whether a PR2's arm begins in its waiting posture and moves to its starts on
                 planned paths; otherwise it moves straight in joint space.
         """
@@ -97,12 +97,7 @@ class Recording:
             self._draw()
 
     def add_reach(self, trace: ReachTrace, p_WG: Vector) -> None:
-        """Records a reach.
-
-        Args:
-            trace: Its samples with their states.
-            p_WG: Its goal, shape (3,), metres.
-        """
+        """Records a reach to a goal p_WG; the trace needs its states."""
         self._draw_goal(p_WG)
         self._show_forces(True)
         self._b0 = trace.b0
@@ -114,12 +109,7 @@ class Recording:
             self._clock_s = begin + math.ceil(trace.time_s[-1] + PAUSE_S)
 
     def move_to(self, b0: Vector, q: Vector) -> None:
-        """Records the moves of base, torso and arm to a start, in that order.
-
-        Args:
-            b0: Base position and torso height, shape (3,), metres.
-            q: Joint angles, shape (m,), radians.
-        """
+        """Records the moves of base, torso and arm to a start, in that order."""
         for next_b0 in (np.array([*b0[:2], self._b0[2]]), b0):
             self._follow(next_b0, self._q[None])
         self._follow(b0, q[None] if self._approach is None else self._approach.path(b0, q))

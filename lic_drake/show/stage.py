@@ -22,16 +22,9 @@ def add_stage(
 ) -> Scene:
     """Adds plant and scene graph of an environment with a robot that `place` can place.
 
-    Contact forces follow from the state alone, since the plant is continuous.
-
-    Args:
-        builder: Gets plant and scene graph.
-        scenario: Robot and contact.
-        instance: The environment.
-        drake_models: Folder of package://drake_models, to show a PR2 in its meshes.
-
-    Raises:
-        ModelError: The meshes cannot be read.
+    Contact forces follow from the state alone, since the plant is continuous. With `drake_models`,
+    the folder of package://drake_models, a PR2 has its meshes; a ModelError says that they cannot
+    be read.
     """
     config = replace(scenario.scene, time_step_s=0.0)
     scene = add_scene(builder, scenario.arm(), instance, config, visuals=True, mobile=True)
@@ -43,14 +36,9 @@ def add_stage(
 def place(
     scene: Scene, root: Context, b0: Vector, q: Vector, state: SceneState | None = None
 ) -> None:
-    """Places the robot of a mobile scene, and the clutter if a state is given.
+    """Places the robot of a mobile scene, in a context of the diagram that has the scene.
 
-    Args:
-        scene: The scene.
-        root: A context of the diagram that has the scene.
-        b0: Base position (x, y) and torso height, shape (3,), metres.
-        q: Joint angles, shape (m,), radians.
-        state: Gives the joint velocities, otherwise zero, and the state of the clutter.
+    A state gives the joint velocities, otherwise zero, and the state of the clutter.
     """
     plant = scene.plant
     context = plant.GetMyMutableContextFromRoot(root)

@@ -65,13 +65,7 @@ SPATIAL_VIEWS: dict[str, View] = {
 
 
 class Still(NamedTuple):
-    """An image and the contact forces at that moment.
-
-    Attributes:
-        image: Colours only.
-        p_WC: Points of application, shape (n, 3), metres.
-        f_W: Forces on the arm, shape (n, 3), N.
-    """
+    """An image without depths, and the forces f_W on the arm at points p_WC, shape (n, 3)."""
 
     image: CameraImage
     p_WC: Vector
@@ -88,13 +82,7 @@ class StillCamera:
         p_WG: Vector,
         drake_models: Path | None = None,
     ) -> None:
-        """Builds the scene.
-
-        Args:
-            scenario: Robot and contact.
-            instance: The environment.
-            p_WG: The goal, shape (3,), metres.
-            drake_models: Folder of package://drake_models, to show a PR2 in its meshes.
+        """Builds the scene; see `lic_drake.show.stage.add_stage`.
 
         Raises:
             RenderingError: The renderer does not work on this machine, or not with these meshes.
@@ -122,13 +110,7 @@ class StillCamera:
         self._context = self._diagram.CreateDefaultContext()
 
     def take(self, view: str, b0: Vector, state: SceneState) -> Still:
-        """Returns a still.
-
-        Args:
-            view: One of the names in `views`.
-            b0: Base position and torso height, shape (3,), metres.
-            state: State of arm and clutter.
-        """
+        """Returns a still from one of `views`, given by its name."""
         place(self._scene, self._context, b0, state.q, state)
         X_WC = look_at(*self.views[view])
         image = CameraImage(
@@ -159,19 +141,8 @@ def save_stills(
 ) -> dict[str, Path]:
     """Writes attempt1_start.png, attempt1_middle.png, attempt1_end.png and so on.
 
-    For a robot in space attempt1_inside.png shows the end from behind the board.
-
-    Args:
-        trial: What to show.
-        out: The folder.
-        say: Receives a warning if stills cannot be rendered; none are written then.
-        drake_models: Folder of package://drake_models, to show a PR2 in its meshes.
-
-    Returns:
-        The files by kind.
-
-    Raises:
-        LicError: A file cannot be written.
+    For a robot in space attempt1_inside.png shows the end from behind the board. Returns the files
+    by kind; where stills cannot be rendered, `say` receives a warning and none are written.
     """
     try:
         camera = StillCamera(trial.scenario, trial.instance, trial.p_WG, drake_models)

@@ -54,7 +54,7 @@ def draw_view(
         instance: The clutter as it was drawn.
         p_WG: Goal, shape (3,), metres.
         attempts: Labels and traces of the reaches.
-        axes: From where to look.
+        axes: From where to look: `TOP`, `SIDE` or `FRONT`.
     """
     _draw_objects(ax, instance, axes, 1.0 if scenario.arm().is_planar else 0.6)
     _draw_starts(ax, make_starts(scenario, instance).grid, axes)
@@ -78,13 +78,7 @@ def draw_snapshot(
 ) -> Axes:
     """Draws sample k of a reach from above, with the tip's path up to it (paper Fig. 5).
 
-    Args:
-        ax: Where to draw.
-        scenario: Gives the arm, the feasible starts and the goal's size.
-        instance: The clutter as it was drawn.
-        p_WG: Goal, shape (3,), metres.
-        trace: Samples with their states.
-        k: Index of the sample.
+    The trace needs its states; for the other arguments see `draw_view`.
     """
     _draw_objects(ax, instance.with_objects_at(trace.states[k].q_clutter), TOP, 1.0)
     _draw_starts(ax, make_starts(scenario, instance).grid, TOP)
