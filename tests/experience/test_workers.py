@@ -9,24 +9,18 @@ from pathlib import Path
 import pytest
 from support.collecting import OPTIONS, Start, is_alive, wait_until
 from support.dask_cluster import DaskCluster, dask_cluster
-from support.fake_reach import (
-    FakeReach,
-    comparable,
-    count_threads,
-    expected_records,
-    make_request,
-)
+from support.fake_reach import FakeReach, comparable, expected_records, make_request
+from support.light_tasks import count_threads, deaths_of, work
 
 from lic_drake.cli.main import main
 from lic_drake.errors import ClusterError
 from lic_drake.experience.check import check_library
 from lic_drake.experience.collect import collect
-from lic_drake.experience.runner import Progress, ReachFunction
+from lic_drake.experience.runner import Progress, ReachFunction, Task, run_tasks
 from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.experience.workers import DaskWorkers, LocalWorkers
+from lic_drake.experience.workers import DaskWorkers, LocalWorkers, Workers
 
 REQUEST = make_request()
-DEADLY = REQUEST.reaches(0)[7].key
 NO_DASK = "Dask is missing: pip install 'lic_drake[cluster]'"
 
 
@@ -46,10 +40,25 @@ def options(request: pytest.FixtureRequest) -> tuple[str, str]:
     return ("--scheduler", request.getfixturevalue("dask").address)
 
 
-def run(options: tuple[str, str], library: ExperienceLibrary, reach: ReachFunction) -> Progress:
+def workers_of(options: tuple[str, str]) -> Workers:
     kind, value = options
-    with LocalWorkers(2) if kind == "--workers" else DaskWorkers(value) as workers:
+    return LocalWorkers(2) if kind == "--workers" else DaskWorkers(value)
+
+
+def run(options: tuple[str, str], library: ExperienceLibrary, reach: ReachFunction) -> Progress:
+    with workers_of(options) as workers:
         return collect(library, REQUEST, workers, reach=reach)
+
+
+def run_light(
+    options: tuple[str, str], folder: Path, *deadly: object
+) -> tuple[dict[str, str], list[str]]:
+    """Runs three tasks, the first of which dies; returns those that failed and that finished."""
+    finished: list[str] = []
+    tasks = [Task("a", (folder, "a", *deadly)), *(Task(name, (folder, name)) for name in "bc")]
+    with workers_of(options) as workers:
+        failed = run_tasks(tasks, work, workers, lambda task, result: finished.append(result))
+    return failed, sorted(finished)
 
 
 def test_workers_simulate_the_same_library_in_their_own_processes(
@@ -63,30 +72,28 @@ def test_workers_simulate_the_same_library_in_their_own_processes(
     assert os.getpid() not in reach.processes()
 
 
-def test_a_killed_worker_loses_only_the_environments_in_progress(
-    options: tuple[str, str], library: ExperienceLibrary, reach: FakeReach
+def test_the_calls_in_progress_when_a_worker_was_killed_are_repeated(
+    options: tuple[str, str], tmp_path: Path
 ) -> None:
-    assert run(options, library, replace(reach, deadly=DEADLY, deaths=1)).failed == {}
-    assert comparable(library.records()) == expected_records(REQUEST)
-    assert reach.log.with_suffix(".deaths").read_text() == "x"
+    assert run_light(options, tmp_path, 1) == ({}, ["a", "b", "c"])
+    assert deaths_of(tmp_path, "a") == "x"
 
 
-def test_an_environment_that_aborts_the_interpreter_is_abandoned_and_the_others_finish(
-    options: tuple[str, str], library: ExperienceLibrary, reach: FakeReach
+def test_a_task_that_aborts_the_interpreter_is_abandoned_and_the_others_finish(
+    options: tuple[str, str], tmp_path: Path
 ) -> None:
-    deadly = replace(reach, deadly=DEADLY, deaths=99, death=signal.SIGABRT)
-    report = run(options, library, deadly)
-    assert list(report.failed) == ["training-000000"]
-    assert " died " in report.failed["training-000000"]
-    assert report.done == 24
-    assert {record.environment for record in library.records()} == {1, 2}
+    failed, finished = run_light(options, tmp_path, 99, signal.SIGABRT)
+    assert list(failed) == ["a"] and " died " in failed["a"]
+    assert finished == ["b", "c"]
     if options[0] == "--workers":
-        assert reach.log.with_suffix(".deaths").read_text() == "xxx"
-    assert collect(library, REQUEST, reach=reach).failed == {}
-    assert comparable(library.records()) == expected_records(REQUEST)
+        assert deaths_of(tmp_path, "a") == "xxx"
 
 
-@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize(
+    ("options", "end"),
+    [("local", signal.SIGINT), ("local", signal.SIGKILL), ("dask", signal.SIGINT)],
+    indirect=["options"],
+)
 def test_after_an_interrupted_or_killed_collector_the_same_request_resumes(
     options: tuple[str, str],
     library: ExperienceLibrary,
@@ -112,7 +119,7 @@ def test_after_an_interrupted_or_killed_collector_the_same_request_resumes(
     assert comparable(library.records()) == expected_records(REQUEST)
 
 
-def test_of_two_concurrent_collections_the_second_is_rejected(
+def test_of_concurrent_collections_shares_fill_one_library_and_any_other_is_rejected(
     tmp_path: Path,
     library: ExperienceLibrary,
     reach: FakeReach,
@@ -121,43 +128,28 @@ def test_of_two_concurrent_collections_the_second_is_rejected(
 ) -> None:
     hold = tmp_path / "hold"
     hold.touch()
-    first = start(library.path, replace(reach, hold=hold), "--workers", "1")
-    wait_until(lambda: any(library.path.glob("*.yaml")))
-    assert main(["collect", str(library.path), *OPTIONS, "--share", "1/2"]) == 2
-    assert f"another process is adding to {library.path} (it holds" in capsys.readouterr().err
-    hold.unlink()
-    assert "lic: " not in first.communicate(timeout=60)[1]
-    assert check_library(library, REQUEST)["is_sound"]
-    assert len(reach.calls()) == len(set(reach.calls())) == 36
-
-
-def test_shares_of_a_job_array_fill_one_library_concurrently(
-    tmp_path: Path, library: ExperienceLibrary, reach: FakeReach, start: Start
-) -> None:
-    hold = tmp_path / "hold"
-    hold.touch()
     first = start(library.path, replace(reach, hold=hold), "--workers", "1", "--share", "1/2")
     wait_until(lambda: any(library.path.glob("*.yaml")))
-    # The second is done before the first has begun a reach.
+    for other in ("1/1", "1/2", "1/3"):
+        assert main(["collect", str(library.path), *OPTIONS, "--share", other]) == 2
+        assert f"another process is adding to {library.path} (it holds" in capsys.readouterr().err
+    # The second share is done before the first has begun a reach.
     assert collect(library, REQUEST, reach=reach, share="2/2").done == 12
     hold.unlink()
     error = first.communicate(timeout=60)[1]
     assert "2 environments x 4 goals x 3 starts, 24 reaches" in error and "lic: " not in error
     assert comparable(library.records()) == expected_records(REQUEST)
-    assert len(reach.calls()) == 36 and len(reach.processes()) == 2
+    assert len(reach.calls()) == len(set(reach.calls())) == 36
+    assert len(reach.processes()) == 2
 
 
-def test_workers_use_one_blas_thread(
-    library: ExperienceLibrary, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_workers_use_one_blas_thread(monkeypatch: pytest.MonkeyPatch) -> None:
     if (os.cpu_count() or 1) == 1:
         pytest.skip("one CPU: linear algebra has one thread anyway")
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         monkeypatch.delenv(name)
-    request = make_request(environments=1, max_goals=1, max_starts=1)
     with LocalWorkers(1) as workers:
-        collect(library, request, workers, reach=count_threads)
-    assert [record.detail for record in library.records()] == ["[1]"]
+        assert workers.submit(count_threads).result() == [1]
 
 
 def test_a_dask_worker_with_several_threads_is_rejected(

@@ -3,10 +3,9 @@
 import hashlib
 import math
 import os
-import signal
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,7 @@ from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.request import ReachRecord, ReachRequest, flat_starts
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.start import IN_PLANE
+from support.light_tasks import append
 
 
 def make_request(**values: object) -> CollectionRequest:
@@ -118,18 +118,12 @@ class FakeReach:
         log: File that gets a line "key pid" for each finished call.
         sleep_s: Duration of a call, seconds.
         hold: A call waits as long as this file is there.
-        deadly: Key of the request that ends its process ...
-        deaths: ... this many times ...
-        death: ... by this signal.
         failing_environment: Environment whose reaches raise.
     """
 
     log: Path
     sleep_s: float = 0.0
     hold: Path = Path("/nowhere")
-    deadly: str = ""
-    deaths: int = 1
-    death: signal.Signals = signal.SIGKILL
     failing_environment: int = -1
 
     def __call__(self, request: ReachRequest) -> ReachRecord:
@@ -138,13 +132,7 @@ class FakeReach:
         time.sleep(self.sleep_s)
         while self.hold.exists():
             time.sleep(0.02)
-        deaths = self.log.with_suffix(".deaths")
-        if request.key == self.deadly:
-            already = deaths.stat().st_size if deaths.exists() else 0
-            if already < self.deaths:
-                _append(deaths, "x")
-                signal.raise_signal(self.death)  # To this very thread, like os.abort().
-        _append(self.log, f"{request.key} {os.getpid()}\n")
+        append(self.log, f"{request.key} {os.getpid()}\n")
         return make_record(request)
 
     def calls(self) -> list[str]:
@@ -157,17 +145,6 @@ class FakeReach:
 
     def _lines(self) -> list[str]:
         return self.log.read_text().splitlines() if self.log.exists() else []
-
-
-def count_threads(request: ReachRequest) -> ReachRecord:
-    """Notes in the record how many threads the linear algebra of the worker may use."""
-    import numpy as np
-    import scipy.linalg
-    from threadpoolctl import threadpool_info
-
-    scipy.linalg.solve(np.eye(2), np.ones(2))
-    threads = sorted({pool["num_threads"] for pool in threadpool_info()})
-    return replace(make_record(request), detail=str(threads))
 
 
 def comparable(records: list[ReachRecord]) -> list[str]:
@@ -187,9 +164,3 @@ def expected_records(request: CollectionRequest) -> list[str]:
             for item in request.reaches(environment)
         ]
     )
-
-
-def _append(path: Path, text: str) -> None:
-    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
-    os.write(descriptor, text.encode())
-    os.close(descriptor)
