@@ -1,5 +1,6 @@
 """What all tests share: plots without a display, hypothesis settings, a browser, a renderer."""
 
+import gc
 import os
 import shutil
 import signal
@@ -21,6 +22,12 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 # A first example may pay for Drake's import or a plant; CI must not fail on a lucky draw.
 settings.register_profile("lic", deadline=None, derandomize=bool(os.environ.get("CI")))
 settings.load_profile("lic")
+
+
+def pytest_collection_finish() -> None:
+    """Spares the garbage collector what imports have made, most of the objects: all of it stays."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")

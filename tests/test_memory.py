@@ -65,7 +65,8 @@ def test_a_session_keeps_a_limited_number_of_diagrams_and_drops_them_all_when_it
     gc.disable()  # The collector is not left to chance.
     try:
         for count in range(4):
-            scenario = load_scenario("cylinder-clutter", f"{{clutter: {{num_fixed: {count}}}}}")
+            few = f"{{clutter: {{num_movable: 3, num_fixed: {count}}}}}"
+            scenario = load_scenario("cylinder-clutter", few)
             session.run(reach_request(replace(scenario, stop=free_space(0.04).stop)))
         left = sum(reference() is not None for reference in built)
     finally:

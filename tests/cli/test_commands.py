@@ -173,6 +173,7 @@ def test_collecting_and_looking_at_it_as_json(
         assert strict_json(capsys.readouterr().out)["reaches"] == 36
 
 
+@pytest.mark.usefixtures("_here")
 def test_an_evaluation_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     command = ["evaluate", str(tmp_path / "new"), "--methods", "rnd", "cost", "--json"]
     small = ["--environments", "2", "--attempts", "1", "--workers", "1"]

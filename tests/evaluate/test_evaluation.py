@@ -1,3 +1,5 @@
+import shutil
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +18,8 @@ from lic_drake.experience.workers import LocalWorkers
 from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.scenario import load_scenario
 
+Evaluate = Callable[..., Evaluation]
+LEARNED = ("rnd", "knn1")
 EASY = "{clutter: {num_movable: 2, num_fixed: 2}, stop: {timeout_s: 0.2}}"
 
 
@@ -32,12 +36,22 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return keys
 
 
-def evaluation(tmp_path: Path, **values: Any) -> Evaluation:
-    if not (tmp_path / "library").exists():
-        planar_library(tmp_path / "library", load_scenario("cylinder-clutter", EASY))
-    paths = {"experience": tmp_path / "library", "results": tmp_path / "out"}
-    defaults = {"methods": ("rnd", "knn1"), "environments": 3, "goals": 2}
-    return Evaluation(**{**paths, **defaults, **values})
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("cylinders") / "library"
+    return planar_library(path, load_scenario("cylinder-clutter", EASY)).path
+
+
+@pytest.fixture
+def evaluation(library: Path, tmp_path: Path) -> Evaluate:
+    """Makes an evaluation of baselines, which select at once, unless told otherwise."""
+
+    def make(**values: Any) -> Evaluation:
+        paths = {"experience": library, "results": tmp_path / "out"}
+        defaults = {"methods": ("rnd", "cost"), "environments": 3, "goals": 2}
+        return Evaluation(**{**paths, **defaults, **values})
+
+    return make
 
 
 def without_times(rows: list[TrialRow]) -> list[str]:
@@ -49,9 +63,9 @@ def quiet(_: str) -> None:
 
 
 def test_strategies_are_tried_at_the_same_goals_of_the_same_environments(
-    tmp_path: Path, calls: list[str]
+    evaluation: Evaluate, calls: list[str]
 ) -> None:
-    asked = evaluation(tmp_path)
+    asked = evaluation(methods=LEARNED)
     lines: list[str] = []
     rows = run_evaluation(asked, say=lines.append)
     records = {record.key: record for record in asked.reaches.records()}
@@ -70,8 +84,8 @@ def test_strategies_are_tried_at_the_same_goals_of_the_same_environments(
     assert lines[-1].startswith(f"  3/3 environments, {len(rows)} attempts, 0 s left")
 
 
-def test_rows_agree_with_the_library_of_reaches(tmp_path: Path, calls: list[str]) -> None:
-    asked = evaluation(tmp_path, attempts=3)
+def test_rows_agree_with_the_library_of_reaches(evaluation: Evaluate, calls: list[str]) -> None:
+    asked = evaluation(methods=LEARNED, attempts=3)
     rows = run_evaluation(asked, say=quiet)
     records = {record.key: record for record in asked.reaches.records()}
     scenario = asked.reaches.scenario()
@@ -93,9 +107,9 @@ def test_rows_agree_with_the_library_of_reaches(tmp_path: Path, calls: list[str]
 
 
 def test_fresh_attempts_find_a_reset_environment_and_environments_may_share_goals(
-    tmp_path: Path, calls: list[str]
+    evaluation: Evaluate, calls: list[str]
 ) -> None:
-    asked = evaluation(tmp_path, fresh=True, variant="fresh", common_goals=True)
+    asked = evaluation(fresh=True, variant="fresh", common_goals=True)
     rows = run_evaluation(asked, say=quiet)
     assert any(row.attempt == 2 for row in rows)
     assert {row.variant for row in rows} == {"fresh"}
@@ -106,9 +120,9 @@ def test_fresh_attempts_find_a_reset_environment_and_environments_may_share_goal
 
 
 def test_a_second_run_simulates_nothing_and_a_larger_one_only_what_is_new(
-    tmp_path: Path, calls: list[str]
+    evaluation: Evaluate, calls: list[str]
 ) -> None:
-    asked = evaluation(tmp_path, environments=2, goals=1, attempts=1)
+    asked = evaluation(environments=2, goals=1, attempts=1)
     rows = without_times(run_evaluation(asked, say=quiet))
     content = comparable(asked.reaches.records())
     first = set(calls)
@@ -124,10 +138,13 @@ def test_a_second_run_simulates_nothing_and_a_larger_one_only_what_is_new(
 
 
 def test_an_interrupted_evaluation_simulates_nothing_twice(
-    tmp_path: Path, calls: list[str], monkeypatch: pytest.MonkeyPatch
+    evaluation: Evaluate,
+    tmp_path: Path,
+    calls: list[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(dut, "SAY_S", 0.0)
-    asked = evaluation(tmp_path, environments=5, methods=("rnd", "cost"))
+    asked = evaluation(environments=5)
     expected = without_times(run_evaluation(replace(asked, results=tmp_path / "whole"), say=quiet))
     calls.clear()
     lines: list[str] = []
@@ -149,12 +166,12 @@ def test_an_interrupted_evaluation_simulates_nothing_twice(
 
 
 def test_the_file_keeps_trials_of_other_variants_and_strategies(
-    tmp_path: Path, calls: list[str]
+    evaluation: Evaluate, tmp_path: Path, calls: list[str]
 ) -> None:
-    plain = evaluation(tmp_path, methods=("rnd", "cost"))
+    plain = evaluation()
     rows = run_evaluation(plain, say=quiet)
     fresh = run_evaluation(replace(plain, fresh=True, variant="fresh"), say=quiet)
-    more = run_evaluation(replace(plain, methods=("knn1",)), say=quiet)
+    more = run_evaluation(replace(plain, methods=("rnd>cost",)), say=quiet)
     # Fewer environments: replaces the trials of the same variant and method.
     fewer = run_evaluation(replace(plain, methods=("rnd",), environments=1), say=quiet)
     expected = [*(row for row in rows if row.method == "cost"), *fresh, *more, *fewer]
@@ -163,10 +180,12 @@ def test_the_file_keeps_trials_of_other_variants_and_strategies(
 
 
 def test_apertures_are_evaluated_with_bases_and_strategies_may_follow_others(
-    tmp_path: Path, calls: list[str]
+    evaluation: Evaluate, tmp_path: Path, calls: list[str]
 ) -> None:
-    planar_library(tmp_path / "library", load_scenario("cylinder-aperture-clutter", EASY))
-    asked = evaluation(tmp_path, methods=("rnd", "cost", "knn", "rnd>cost"), goals=1)
+    apertures = load_scenario("cylinder-aperture-clutter", EASY)
+    library = planar_library(tmp_path / "library", apertures).path
+    methods = ("rnd", "cost", "knn", "rnd>cost")
+    asked = evaluation(experience=library, methods=methods, goals=1)
     rows = run_evaluation(asked, say=quiet)
     scenario = asked.reaches.scenario()
     assert len({record.base_y for record in asked.reaches.records()}) > 3
@@ -179,32 +198,35 @@ def test_apertures_are_evaluated_with_bases_and_strategies_may_follow_others(
     assert firsts["rnd>cost"] == firsts["rnd"] != firsts["cost"]
 
 
-def test_a_worker_process_gives_the_rows_and_reaches_of_this_process(tmp_path: Path) -> None:
+def test_a_worker_process_gives_the_rows_and_reaches_of_this_process(
+    evaluation: Evaluate, tmp_path: Path
+) -> None:
     results = []
     with LocalWorkers(1) as process:
         for i, workers in enumerate((None, process)):
-            asked = evaluation(tmp_path, results=tmp_path / str(i), goals=1)
+            asked = evaluation(results=tmp_path / str(i), methods=LEARNED, environments=2, goals=1)
             rows = run_evaluation(asked, workers, quiet)
             results.append((without_times(rows), comparable(asked.reaches.records())))
     assert results[0] == results[1]
-    assert len(results[0][0]) > 6
+    assert len(results[0][0]) > 4
     # These were simulated: the longest ends by the time limit.
     assert max(record.duration_s for record in asked.reaches.records()) == pytest.approx(0.2)
 
 
 def test_what_cannot_be_evaluated_is_refused_before_any_reach(
-    tmp_path: Path, calls: list[str]
+    evaluation: Evaluate, library: Path, tmp_path: Path, calls: list[str]
 ) -> None:
     with pytest.raises(RequestError, match="unknown method 'svm'"):
-        run_evaluation(evaluation(tmp_path, methods=("rnd", "svm")))
+        run_evaluation(evaluation(methods=("rnd", "svm")))
     assert not (tmp_path / "out").exists()
-    asked = evaluation(tmp_path, methods=("rnd",))
+    copied = shutil.copytree(library, tmp_path / "library")
+    asked = evaluation(experience=copied, methods=("rnd",))
     run_evaluation(asked, say=quiet)
     calls.clear()
     with pytest.raises(LibraryError, match="holds reaches of scenario"):
         run_evaluation(replace(asked, overrides="{stop: {timeout_s: 0.4}}"), say=quiet)
     # What a worker cannot read is an error here.
-    (shard, *_) = ExperienceLibrary(tmp_path / "library").shard_paths()
+    (shard, *_) = ExperienceLibrary(copied).shard_paths()
     shard.write_bytes(shard.read_bytes()[:-100])
     with pytest.raises(LibraryError, match="is damaged or not a Parquet file"):
         run_evaluation(asked, say=quiet)

@@ -59,7 +59,7 @@ def shard(tmp_path: Path) -> Path:
     return path
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=50)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=20)
 @given(st.lists(any_record, max_size=5))
 def test_records_round_trip_bit_for_bit(tmp_path: Path, records: list[ReachRecord]) -> None:
     path = tmp_path / "any.parquet"
@@ -80,7 +80,7 @@ def test_a_file_carries_units_and_the_whole_scenario(tmp_path: Path) -> None:
     assert all(schema.field(name).metadata[b"doc"] for name in schema.names)
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=200)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=100)
 @given(st.data())
 def test_a_flipped_byte_raises_nothing_but_library_errors(shard: Path, data: st.DataObject) -> None:
     content = bytearray(shard.read_bytes())

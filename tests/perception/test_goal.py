@@ -55,7 +55,7 @@ def test_errors_of_noisy_images_are_as_large_as_the_covariance_says(with_pose: b
     image = look(p_WG)
     camera = CameraConfig() if with_pose else EXACT
     squared, off = [], []
-    for index in range(25):
+    for index in range(15):
         noisy = disturbed_image(image, camera, np.random.default_rng(index))
         found = find_goal(noisy, camera, RADIUS)
         error = found.p_WG - p_WG

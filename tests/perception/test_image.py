@@ -68,8 +68,8 @@ def test_the_covariance_of_a_point_is_what_many_wrong_poses_scatter_it_by() -> N
     image = blank(tilted(20.0, 30.0), np.array([0.1, 0.2, 1.0]), width=32, height=24)
     p_CQ = np.array([0.3, -0.2, 1.5])
     rng = np.random.default_rng(0)
-    believed = [disturbed_image(image, camera, rng) for _ in range(4000)]
+    believed = [disturbed_image(image, camera, rng) for _ in range(1500)]
     p_WQ = np.array([view.p_WC + view.R_WC @ p_CQ for view in believed])
     expected = pose_covariance(image.R_WC @ p_CQ, camera.pose_error)
-    np.testing.assert_allclose(np.cov(p_WQ.T), expected, atol=0.06 * np.trace(expected))
+    np.testing.assert_allclose(np.cov(p_WQ.T), expected, atol=0.1 * np.trace(expected))
     np.testing.assert_allclose(believed[0].R_WC @ believed[0].R_WC.T, np.eye(3), atol=1e-12)

@@ -14,7 +14,7 @@ from support.mesh_package import write_drake_models
 
 from lic_drake.errors import LicError, RequestError
 from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.perception.config import load_cameras
+from lic_drake.perception.config import CameraConfig, load_cameras
 from lic_drake.perception.observer import Observer
 from lic_drake.reach.request import ReachRequest
 from lic_drake.reach.scenario import load_scenario
@@ -97,8 +97,10 @@ def test_a_second_attempt_starts_elsewhere_and_the_pictures_are_the_new_ones_onl
 
 
 def test_a_pr2_shows_what_it_did_in_drakes_meshes(
-    spheres: ExperienceLibrary, tmp_path: Path
+    spheres: ExperienceLibrary, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    small = CameraConfig(width=320, height=240, focal_px=275.0)
+    monkeypatch.setattr("lic_drake.show.stills.CAMERA", small)
     scenario = spheres.scenario("{clutter: {num_blocked: 8}}")
     lines: list[str] = []
     package = write_drake_models(tmp_path / "package")

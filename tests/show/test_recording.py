@@ -151,7 +151,8 @@ def test_a_browser_shows_arm_and_clutter(tmp_path: Path, chromium: str) -> None:
     result = Environment(scenario, instance).reach(P_WG, EASY_START, keep_states=True)
     recording.add_reach(result.trace, P_WG)
     recording.save(tmp_path / "reach.html")
-    image, console = visit(chromium, f"file://{tmp_path / 'reach.html'}", tmp_path)
+    address, size = f"file://{tmp_path / 'reach.html'}", (600, 400)
+    image, console = visit(chromium, address, tmp_path, size)
     assert console == []
     # Without the upper edge, where Meshcat puts its controls.
     assert_shows_a_scene(image[40:])
