@@ -21,16 +21,18 @@ from lic_drake.types import Vector
 
 ATTEMPT_COLORS = ("tab:blue", "tab:purple", "tab:green", "tab:olive", "tab:cyan")
 """Colours of successive attempts, repeated if there are more."""
+DOTS_PER_INCH = 150
+"""Resolution of files."""
 
 
 def save_figure(figure: Figure, path: Path, margins: bool = True) -> None:
-    """Writes a figure at 150 dots per inch, with `margins` cropped to small ones.
+    """Writes a figure, with `margins` cropped to small ones.
 
     The ending gives the format. Raises a LicError if the file cannot be written.
     """
     try:
         with readable_errors(path, "write"):
-            figure.savefig(path, dpi=150, bbox_inches="tight" if margins else None)
+            figure.savefig(path, dpi=DOTS_PER_INCH, bbox_inches="tight" if margins else None)
     except ValueError as error:  # The ending is unknown.
         raise LicError(f"cannot write {path}: {error}") from None
 

@@ -40,6 +40,14 @@ def spheres(tmp_path_factory: pytest.TempPathFactory) -> ExperienceLibrary:
     return sphere_library(tmp_path_factory.mktemp("spheres"))
 
 
+@pytest.fixture(autouse=True)
+def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures of few pixels."""
+    monkeypatch.setattr("lic_drake.show.figures.DOTS_PER_INCH", 30)
+    small = CameraConfig(width=320, height=240, focal_px=275.0)
+    monkeypatch.setattr("lic_drake.show.stills.CAMERA", small)
+
+
 @pytest.fixture
 def _no_stills(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("lic_drake.show.pictures.save_stills", lambda *args: {})
@@ -97,10 +105,8 @@ def test_a_second_attempt_starts_elsewhere_and_the_pictures_are_the_new_ones_onl
 
 
 def test_a_pr2_shows_what_it_did_in_drakes_meshes(
-    spheres: ExperienceLibrary, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    spheres: ExperienceLibrary, tmp_path: Path
 ) -> None:
-    small = CameraConfig(width=320, height=240, focal_px=275.0)
-    monkeypatch.setattr("lic_drake.show.stills.CAMERA", small)
     scenario = spheres.scenario("{clutter: {num_blocked: 8}}")
     lines: list[str] = []
     package = write_drake_models(tmp_path / "package")
