@@ -48,10 +48,10 @@ FREE_REACHES = [((0.335, -0.4, 0.0), (0.7, -0.2)), ((0.335, 0.3, 90.0), (0.45, 0
     ("preset", "time", "bend"),
     [
         # At 0.05 m/s the hand keeps to the line; it lags by half a second, each joint its own way.
-        ("ijrr_2013", 14.0, 0.1),
+        ("ijrr_2013", 12.0, 0.1),
         # 0.5 m/s is more than half a degree a step allows: the joints turn at their limits, and
         # the hand takes a bend of up to a third of the distance.
-        ("haptic_mpc_2013", 9.0, 0.45),
+        ("haptic_mpc_2013", 7.5, 0.45),
     ],
 )
 def test_in_free_space_the_hand_comes_to_the_goal_and_stays_there(
@@ -83,7 +83,7 @@ def test_in_free_space_the_hand_comes_to_the_goal_and_stays_there(
 
 @pytest.mark.parametrize(
     ("preset", "threshold", "time", "side"),
-    [("haptic_mpc_2013", 3.0, 12.0, -1.0), ("ijrr_2013", 5.0, 14.0, 1.0)],
+    [("haptic_mpc_2013", 3.0, 9.0, -1.0), ("ijrr_2013", 5.0, 11.0, 1.0)],
 )
 def test_against_a_fixed_cylinder_the_force_settles_at_the_threshold(
     preset: str, threshold: float, time: float, side: float

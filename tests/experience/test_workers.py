@@ -50,17 +50,6 @@ def run(options: tuple[str, str], library: ExperienceLibrary, reach: ReachFuncti
         return collect(library, REQUEST, workers, reach=reach)
 
 
-def run_light(
-    options: tuple[str, str], folder: Path, *deadly: object
-) -> tuple[dict[str, str], list[str]]:
-    """Runs three tasks, the first of which dies; returns those that failed and that finished."""
-    finished: list[str] = []
-    tasks = [Task("a", (folder, "a", *deadly)), *(Task(name, (folder, name)) for name in "bc")]
-    with workers_of(options) as workers:
-        failed = run_tasks(tasks, work, workers, lambda task, result: finished.append(result))
-    return failed, sorted(finished)
-
-
 def test_workers_simulate_the_same_library_in_their_own_processes(
     options: tuple[str, str], library: ExperienceLibrary, reach: FakeReach
 ) -> None:
@@ -70,23 +59,6 @@ def test_workers_simulate_the_same_library_in_their_own_processes(
     assert len(reach.calls()) == len(set(reach.calls())) == 36
     assert len(reach.processes()) == 2
     assert os.getpid() not in reach.processes()
-
-
-def test_the_calls_in_progress_when_a_worker_was_killed_are_repeated(
-    options: tuple[str, str], tmp_path: Path
-) -> None:
-    assert run_light(options, tmp_path, 1) == ({}, ["a", "b", "c"])
-    assert deaths_of(tmp_path, "a") == "x"
-
-
-def test_a_task_that_aborts_the_interpreter_is_abandoned_and_the_others_finish(
-    options: tuple[str, str], tmp_path: Path
-) -> None:
-    failed, finished = run_light(options, tmp_path, 99, signal.SIGABRT)
-    assert list(failed) == ["a"] and " died " in failed["a"]
-    assert finished == ["b", "c"]
-    if options[0] == "--workers":
-        assert deaths_of(tmp_path, "a") == "xxx"
 
 
 @pytest.mark.parametrize(
@@ -117,6 +89,34 @@ def test_after_an_interrupted_or_killed_collector_the_same_request_resumes(
     assert report["is_sound"]
     assert collect(library, REQUEST, reach=reach).present == report["reaches"]
     assert comparable(library.records()) == expected_records(REQUEST)
+
+
+def run_light(
+    options: tuple[str, str], folder: Path, *deadly: object
+) -> tuple[dict[str, str], list[str]]:
+    """Runs three tasks, the first of which dies; returns those that failed and that finished."""
+    finished: list[str] = []
+    tasks = [Task("a", (folder, "a", *deadly)), *(Task(name, (folder, name)) for name in "bc")]
+    with workers_of(options) as workers:
+        failed = run_tasks(tasks, work, workers, lambda task, result: finished.append(result))
+    return failed, sorted(finished)
+
+
+def test_the_calls_in_progress_when_a_worker_was_killed_are_repeated(
+    options: tuple[str, str], tmp_path: Path
+) -> None:
+    assert run_light(options, tmp_path, 1) == ({}, ["a", "b", "c"])
+    assert deaths_of(tmp_path, "a") == "x"
+
+
+def test_a_task_that_aborts_the_interpreter_is_abandoned_and_the_others_finish(
+    options: tuple[str, str], tmp_path: Path
+) -> None:
+    failed, finished = run_light(options, tmp_path, 99, signal.SIGABRT)
+    assert list(failed) == ["a"] and " died " in failed["a"]
+    assert finished == ["b", "c"]
+    if options[0] == "--workers":
+        assert deaths_of(tmp_path, "a") == "xxx"
 
 
 def test_of_concurrent_collections_shares_fill_one_library_and_any_other_is_rejected(

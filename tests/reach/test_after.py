@@ -18,7 +18,7 @@ from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.session import ReachSession, make_record, run_reach
 from lic_drake.reach.start import Start
 
-SCENARIO = small_clutter(2.5)
+SCENARIO = small_clutter(2.0)
 FIRST = reach_request(SCENARIO, (0.7, 0.0), 0.0, 90.0, environment=2)
 # The same start again; and one elsewhere, of another base.
 SECOND = FIRST.then(FIRST.start)

@@ -50,7 +50,7 @@ def row(x: float, count: int) -> ClutterInstance:
     ],
 )
 def test_a_scene_moves_as_if_nothing_had_slept(instance: ClutterInstance) -> None:
-    asleep, awake = both(instance, 8.0)
+    asleep, awake = both(instance, 6.0)
     first = instance.p_WO[instance.movable, :2]
     moved = np.linalg.norm(awake.trace.states[-1].q_clutter - first, axis=1) > 1e-3
     assert np.any(moved)

@@ -20,7 +20,7 @@ SHOWN = {
     "unknown_category": "first choice",
 }
 
-PARTS = {"cylinder-clutter": 1, "passage-clutter": 20}
+PARTS = {"cylinder-clutter": 1, "passage-clutter": 12}
 """Numbers of environments of the shipped libraries that are enough here."""
 
 

@@ -1,7 +1,9 @@
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
+from support.made_up import small_cameras
 
 from lic_drake.clutter.foliage import FoliageApertureClutter
 from lic_drake.errors import RenderingError
@@ -65,9 +67,10 @@ def test_a_report_has_medians_rates_and_who_was_taken_for_what() -> None:
     assert "| partly | 0 | 0 | 0 | 1 |" in text
 
 
-def test_a_scene_is_measured_with_and_without_errors() -> None:
+def test_a_scene_is_measured_with_and_without_errors(tmp_path: Path) -> None:
+    cameras = load_cameras(small_cameras(tmp_path / "small.yaml"))
     try:
-        apertures, goals = measure_scene(SCENARIO, load_cameras(), 0)
+        apertures, goals = measure_scene(SCENARIO, cameras, 0)
     except RenderingError as error:
         pytest.skip(str(error))
     assert [a.noise for a in apertures] == [False] * 20 + [True] * 20
