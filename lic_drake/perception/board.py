@@ -8,7 +8,6 @@ the wood appears to end only behind that side; bars are assumed to be as thick a
 import numpy as np
 from scipy.ndimage import map_coordinates, uniform_filter
 from scipy.optimize import least_squares
-from scipy.signal import correlate
 from skimage.color import rgb2hsv
 
 from lic_drake.clutter.board import ApertureBoard
@@ -167,6 +166,8 @@ def _fit_plane(image: CameraImage, camera: CameraConfig) -> BoardView:
 
 def _fit_grid(view: BoardView, board: ApertureBoard) -> tuple[Vector, Vector]:
     """Returns the pose of the grid of bars, and its covariance."""
+    from scipy.signal import correlate  # Takes long to import, and most evaluations do without.
+
     extent, size = view.covered_range(), _counts(board) * board.aperture_m
     # Leaves room for a board that is partly out of view, and for its surroundings.
     margin = np.maximum(size - (extent[1] - extent[0]), 0.0) + board.aperture_m

@@ -184,7 +184,7 @@ def test_apertures_are_evaluated_with_bases_and_strategies_may_follow_others(
 ) -> None:
     apertures = load_scenario("cylinder-aperture-clutter", EASY)
     library = planar_library(tmp_path / "library", apertures).path
-    methods = ("rnd", "cost", "knn", "rnd>cost")
+    methods = ("rnd", "cost", "rnd>cost")
     asked = evaluation(experience=library, methods=methods, goals=1)
     rows = run_evaluation(asked, say=quiet)
     scenario = asked.reaches.scenario()
@@ -247,7 +247,7 @@ def test_an_evaluation_may_block_apertures_and_keep_the_robot_where_it_is(
     asked = Evaluation(
         experience=spheres.path,
         results=tmp_path / "evaluation",
-        methods=("rnd", "knn1"),
+        methods=("rnd", "cost"),
         environments=2,
         goals=1,
         overrides="{clutter: {num_blocked: 15}}",

@@ -142,7 +142,7 @@ def test_the_command_line_collects_learns_and_selects_with_all_three(
 ) -> None:
     library = str(tmp_path / "library")
     limits = ("--environments", "1", "--max-goals", "3", "--max-starts", "2", "--workers", "1")
-    fewer = "{clutter: {num_boxes: 2}, stop: {timeout_s: 5}}"
+    fewer = "{clutter: {num_boxes: 2}, stop: {timeout_s: 0.2, success_distance_m: 0.35}}"
     scenario = ("--scenario", str(SCENARIO), "--set", fewer)
     command = [sys.executable, "-m", "lic_drake", "collect", library, *scenario, *limits]
     subprocess.run(command, capture_output=True, check=True, env=environment)

@@ -1,10 +1,12 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 from support.fake_reach import make_record, make_request
 
 from lic_drake.experience.pairs import pair_second_attempts
 from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.experience.workers import Workers
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.starts import make_starts
 from scripts.second_attempts.run import collect
@@ -16,8 +18,9 @@ WALL = (
 
 
 def test_every_start_follows_each_failure_and_nothing_is_simulated_twice(
-    tmp_path: Path,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("scripts.common.LocalWorkers", lambda count: Workers())
     scenario = load_scenario("cylinder-clutter", WALL)
     scenario.task.goal_area.upper = scenario.task.goal_area.lower
     experience = ExperienceLibrary(tmp_path / "one-goal")

@@ -17,7 +17,8 @@ from lic_drake.starts import make_starts
 
 SCENARIO = load_scenario(
     "sphere-aperture-clutter",
-    f"{{robot: {NAME}, stop: {{timeout_s: 6.0}}, clutter: {{num_spheres: 6, columns: 3, rows: 1}},"
+    f"{{robot: {NAME}, stop: {{timeout_s: 0.2, success_distance_m: 0.2}},"
+    " clutter: {num_spheres: 6, columns: 3, rows: 1},"
     " task: {torso_m: 0.8, stand: {y_min_m: -0.32, y_max_m: -0.28, torso_min_m: 0.8,"
     " torso_max_m: 0.8, training_y_m: [-0.3], training_torso_m: [0.8]}, goal_area:"
     " {lower: [0.66, -0.4, 0.8], upper: [0.66, -0.2, 0.9], step_m: 0.1}}}",

@@ -31,7 +31,7 @@ FOLIAGE = load_scenario(
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> ExperienceLibrary:
-    scenario = load_scenario("cylinder-clutter")
+    scenario = load_scenario("cylinder-clutter", "{stop: {timeout_s: 2.0}}")
     return planar_library(tmp_path_factory.mktemp("cylinders") / "library", scenario)
 
 

@@ -17,7 +17,7 @@ from support.fake_reach import make_record, make_request
 def planar_library(path: Path, scenario: Scenario) -> ExperienceLibrary:
     """A library of the planar arm: starts to the left of the base succeed."""
     library = ExperienceLibrary(path)
-    request = make_request(scenario=scenario, max_starts=None)
+    request = make_request(scenario=scenario, environments=2, max_goals=3, max_starts=None)
     for environment in request.environment_indices:
         records = [
             replace(make_record(item), success=bool(item.start.x0[1] > item.start.b0[1]))
