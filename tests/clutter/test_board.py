@@ -101,5 +101,8 @@ def test_what_is_blocked_is_random_and_leaves_the_spheres_as_they_are() -> None:
 def test_values_that_make_no_sense_are_refused(values: dict[str, Any], message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
         replace(SHIPPED, **values)
+
+
+def test_more_spheres_than_fit_are_refused() -> None:
     with pytest.raises(ScenarioError, match=r"of 300 objects fit into .* m\^3"):
         sample(replace(SHIPPED, num_spheres=300))

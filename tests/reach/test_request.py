@@ -115,7 +115,7 @@ def test_the_keys_of_the_shipped_libraries_are_those_of_their_requests() -> None
     # A base at the origin and no earlier reach leave keys as they were before there was either.
     for name in ("cylinder-clutter", "passage-clutter"):
         library = ExperienceLibrary(shipped_library(name))
-        scenario, records = library.scenario(), to_records(library.table().slice(0, 400))
+        scenario, records = library.scenario(), to_records(library.table().slice(0, 150))
         for record in records:
             request = ReachRequest.from_record(record, scenario)
             assert not np.any(request.start.b0) and request.start.q is None

@@ -136,7 +136,7 @@ def test_a_thin_wall_stops_the_arm_and_bears_what_the_joints_press_with(
     plant = world.scene.plant
     plant.SetVelocities(world.plant_context, world.scene.arm, speed * to_joints)
     deepest = 0.0
-    for _ in range(400):
+    for _ in range(250):
         world.advance(0.01)
         deepest = min(deepest, gap_to_boxes(world.q, clutter))
     assert -2e-3 < deepest < 0.0
