@@ -4,6 +4,7 @@ import dataclasses
 import math
 import sys
 from collections.abc import Collection, Mapping
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -83,6 +84,24 @@ def read_mapping(text: str | bytes, source: str) -> dict[str, Any]:
     if not isinstance(data, dict):
         raise ScenarioError(f"{source}: must be a YAML mapping, found {type(data).__name__}")
     return data
+
+
+def read_named(name: str | Path, shipped: Path, what: str) -> bytes:
+    """Returns the content of a .yaml file, or of a shipped one given by its name.
+
+    Raises:
+        ScenarioError: There is none; names `what` was sought and all that are shipped.
+    """
+    path = Path(name)
+    if path.suffix not in (".yaml", ".yml"):
+        path = shipped / f"{name}.yaml"
+    try:
+        return path.read_bytes()
+    except (OSError, ValueError):  # A name with a null byte is a ValueError.
+        known = ", ".join(sorted(p.stem for p in shipped.glob("*.yaml")))
+        raise ScenarioError(
+            f"no {what} {str(name)!r}; shipped {shipped.name}: {known}, or give a .yaml path"
+        ) from None
 
 
 def merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:

@@ -47,11 +47,7 @@ class Registry[T]:
         self.entries[name], self._origins[name] = entry, origin
 
     def get(self, name: str) -> T:
-        """Returns the entry with this name.
-
-        Raises:
-            LicError: The name is unknown.
-        """
+        """Returns the entry with this name; the registry's error if it is unknown."""
         load_extensions()
         if name not in self.entries:
             raise self._error(
@@ -67,11 +63,7 @@ class Registry[T]:
 
 @cache
 def load_extensions() -> None:
-    """Imports the modules in `LIC_EXTENSIONS`, once per process.
-
-    Raises:
-        LicError: A module cannot be imported.
-    """
+    """Imports the modules in `LIC_EXTENSIONS`, once per process; a LicError names one it cannot."""
     for name in filter(None, map(str.strip, os.environ.get(VARIABLE, "").split(","))):
         try:
             import_module(name)

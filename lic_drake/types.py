@@ -12,12 +12,9 @@ IntVector = NDArray[np.intp]
 
 
 def check_shapes(arrays: object, **shapes: tuple[int | None, ...]) -> None:
-    """Checks the shapes of an object's array attributes; None is always valid.
+    """Raises a ValueError if an array attribute, unless it is None, has another shape.
 
     A length of None matches any.
-
-    Raises:
-        ValueError: A shape is wrong.
     """
     for name, expected in shapes.items():
         value = getattr(arrays, name)

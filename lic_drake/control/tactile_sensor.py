@@ -45,8 +45,6 @@ class TactileSensor(LeafSystem):
         taxel_force: Normal force on each taxel, size num_taxels, N, compression positive.
 
     Args:
-        arm: The arm.
-        layout: Its taxels.
         skin_links: Skin geometry -> index into the arm's link names.
         body: Geometry of the rest of the robot; contact with oneself is not sensed.
     """

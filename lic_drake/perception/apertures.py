@@ -47,10 +47,8 @@ def find_apertures(
 ) -> DetectedApertures:
     """Locates the board and measures how far each of its apertures is covered.
 
-    Args:
-        image: What the camera sees.
-        camera: Gives the errors of depths and of the camera's pose.
-        board: Gives rows, columns and spacing, which is all that is known beforehand.
+    Of the board only rows, columns and spacing are known beforehand; `camera` gives the errors of
+    depths and of the camera's pose.
 
     Raises:
         PerceptionError: No such board is in view.

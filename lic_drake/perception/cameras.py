@@ -53,11 +53,7 @@ _ROOM = (
 
 
 def make_renderer(lights: Sequence[LightParameter] = _ROOM) -> RenderEngine:
-    """Returns a renderer of camera images.
-
-    Raises:
-        RenderingError: A system library is missing.
-    """
+    """Returns a renderer of camera images; a RenderingError if a system library is missing."""
     params = RenderEngineVtkParams(
         backend="EGL", default_clear_color=[0.80, 0.84, 0.88], lights=list(lights)
     )
@@ -100,10 +96,7 @@ def add_cameras(
 
     In the default context the robot stands where it looks from, its right arm at its side; it faces
     along x if `ahead`, else as the head's configuration says. Returned are the scene, the sensor on
-    the head and the external one.
-
-    Raises:
-        RenderingError: The renderer does not work on this machine.
+    the head and the external one. Raises a RenderingError as `make_renderer` does.
     """
     head, external = cameras.head, cameras.external
     x, y, heading = head.base_pose

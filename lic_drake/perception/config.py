@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lic_drake.config import check_numbers, read_mapping, read_section
+from lic_drake.config import check_numbers, read_mapping, read_named, read_section
 from lic_drake.errors import ScenarioError
 from lic_drake.paths import models_dir
 
@@ -121,14 +121,5 @@ def load_cameras(name: str | Path = "foliage") -> CamerasConfig:
     Raises:
         ScenarioError: There is no such file, or a key or value does not fit.
     """
-    path, shipped = Path(name), models_dir() / "cameras"
-    if path.suffix not in (".yaml", ".yml"):
-        path = shipped / f"{name}.yaml"
-    try:
-        text = path.read_bytes()
-    except (OSError, ValueError):
-        known = ", ".join(sorted(p.stem for p in shipped.glob("*.yaml")))
-        raise ScenarioError(
-            f"no cameras {str(name)!r}; shipped cameras: {known}, or give a .yaml path"
-        ) from None
-    return read_section(CamerasConfig, read_mapping(text, str(path)), str(path))
+    text = read_named(name, models_dir() / "cameras", "cameras")
+    return read_section(CamerasConfig, read_mapping(text, str(name)), str(name))

@@ -24,12 +24,7 @@ RIM = 0.2
 
 @dataclass(frozen=True, kw_only=True)
 class DetectedGoal:
-    """The detected ball.
-
-    Attributes:
-        p_WG: Its centre, shape (3,), metres.
-        covariance: Of the centre, shape (3, 3), m^2.
-    """
+    """The centre of the detected ball, shape (3,), metres, and its covariance, (3, 3), m^2."""
 
     p_WG: Vector
     covariance: Vector

@@ -60,11 +60,8 @@ class Environment:
     ) -> ReachResult:
         """Simulates a reach; a goal out of the arm's reach is known to fail without.
 
-        Args:
-            p_WG: Goal, shape (3,), metres.
-            x0: Start pose of the hand.
-            keep_states: Whether the trace is to hold the whole scene.
-            q: Joint angles as in a `Start` (paper III-E).
+        x0 and q are as in a `Start` (paper III-E); with `keep_states` the trace holds the whole
+        scene.
         """
         p_RG, x0_R = p_WG - self.b0, Start(x0, self.b0).x0_R
         if not is_within_reach(self.scenario, p_RG):

@@ -258,11 +258,7 @@ class ReachRecord:
 
 
 def check_goal(scenario: Scenario, p_RG: Vector) -> None:
-    """Refuses goals, shape (3,), metres, that no reach could come to.
-
-    Raises:
-        RequestError: The goal is not finite or further away than the arm reaches.
-    """
+    """Raises a RequestError for a goal, shape (3,), metres, that is not finite or out of reach."""
     _check_point(p_RG)
     if not is_within_reach(scenario, p_RG):
         arm = scenario.arm()

@@ -14,7 +14,7 @@ import numpy as np
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.clutter.registry import ClutterSampler, get_category
-from lic_drake.config import merge, read_mapping, read_section
+from lic_drake.config import merge, read_mapping, read_named, read_section
 from lic_drake.control.mpc import PRESETS, MpcConfig
 from lic_drake.errors import RequestError, ScenarioError
 from lic_drake.paths import scenarios_dir
@@ -61,8 +61,7 @@ class Scenario:
     def sample_goal(self, stream: str, environment: int, index: int = 0) -> Vector:
         """Returns p_WG, shape (3,), metres: drawn from the goal area or, without one, as offered.
 
-        Raises:
-            RequestError: The environment does not offer that many goals.
+        A RequestError says that the environment does not offer that many goals.
         """
         if self.task.goal_area is not None:
             return self.task.goal_area.sample(make_generator(stream, "goal", environment, index))
@@ -107,16 +106,7 @@ def load_scenario(name_or_path: str | Path, overrides: str = "") -> Scenario:
     Raises:
         ScenarioError: No such scenario, or a key or value that does not fit.
     """
-    path = Path(name_or_path)
-    if path.suffix not in (".yaml", ".yml"):
-        path = scenarios_dir() / f"{name_or_path}.yaml"
-    try:
-        content = path.read_bytes()
-    except (OSError, ValueError):  # A name with a null byte is a ValueError.
-        known = ", ".join(sorted(p.stem for p in scenarios_dir().glob("*.yaml")))
-        raise ScenarioError(
-            f"no scenario {str(name_or_path)!r}; shipped scenarios: {known}, or give a .yaml path"
-        ) from None
+    content = read_named(name_or_path, scenarios_dir(), "scenario")
     return parse_scenario(content, overrides, source=str(name_or_path))
 
 

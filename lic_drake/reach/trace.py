@@ -85,10 +85,8 @@ class ReachTrace:
     def final_velocity(self, still_s: float) -> Vector:
         """Returns the mean tip velocity in the last second of motion, shape (3,), m/s.
 
-        Args:
-            still_s: How long the tip stood still at the end, seconds: the stuck rule's time for a
-                reach that got stuck, else 0. The paper's final velocity would otherwise always be
-                nearly zero there.
+        Before it the tip stood still for `still_s`: the stuck rule's time for a reach that got
+        stuck, where the paper's final velocity would otherwise always be nearly zero, else 0.
         """
         times = np.array(self.time_s)
         end = max(times[-1] - still_s, times[0])

@@ -196,11 +196,9 @@ class Arm:
     ) -> ModelInstanceIndex:
         """Adds the arm without gravity: arms are balanced or move in a horizontal plane.
 
-        Args:
-            plant: The plant, not yet finalized.
-            parent: The frame that becomes R; by default the world's.
-            mobile: Whether b0 = (x, y, z) are positions, too, of joints that nothing drives.
-            height_m: How far R is above the floor of a robot with a torso; see `set_height`.
+        `parent`, by default the world's frame, becomes R, `height_m` above the floor of a robot
+        with a torso, see `set_height`. If `mobile`, b0 = (x, y, z) are positions, too, as in
+        `positions`, of joints that nothing drives.
         """
         if isinstance(self._model, Path):
             (arm,) = Parser(plant).AddModels(str(self._model))

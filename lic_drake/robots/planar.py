@@ -117,15 +117,10 @@ class PlanarKinematics(Kinematics):
 
 
 def make_planar_arm(name: str, model: str | Path) -> Arm:
-    """Returns a three-link planar arm.
+    """Returns a three-link planar arm of a URDF file or text like models/planar_arm.urdf.
 
-    Args:
-        name: Name in scenario files.
-        model: URDF file or text like models/planar_arm.urdf: three links with a collision capsule
-            each, whose joints turn about +z; at zero they point along -y from base to tip.
-
-    Raises:
-        ScenarioError: The model cannot be read or describes another kind of arm.
+    It has three links with a collision capsule each, whose joints turn about +z; at zero they point
+    along -y from base to tip. Another kind of arm is a ScenarioError.
     """
     return Arm(name, model, height_range_m=(0.0, 0.0), is_planar=True, kinematics=PlanarKinematics)
 

@@ -14,10 +14,8 @@ _ROBOTS: Registry[Callable[[], Arm]] = Registry("robot", ScenarioError)
 def register_robot(name: str, make: Callable[[], Arm]) -> None:
     """Makes a robot known under a name in scenario files.
 
-    `make` is asked by every reach, so it should be decorated with `functools.cache`.
-
-    Raises:
-        ScenarioError: The name is taken, or `make` cannot be called.
+    `make` is asked by every reach, so it should be decorated with `functools.cache`. Raises a
+    ScenarioError if the name is taken, or `make` cannot be called.
     """
     if not callable(make):
         raise ScenarioError(

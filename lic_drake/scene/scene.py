@@ -111,16 +111,9 @@ def add_scene(
     """Adds a plant with the arm and the clutter, and its scene graph, to a builder.
 
     Movable objects only translate, in the ground plane or in space: the friction torque of the
-    authors' planar objects exceeds any contact torque, so that they never spin.
-
-    Args:
-        builder: Gets plant and scene graph.
-        arm: The arm.
-        instance: The clutter.
-        config: Simulation parameters.
-        visuals: Whether objects have visual geometry, which takes a third more time to build.
-        mobile: Whether the robot has the positions of `Arm.positions`.
-        height_m: See `Arm.add_to_plant`.
+    authors' planar objects exceeds any contact torque, so that they never spin. With `visuals`
+    objects have visual geometry, too, which takes a third more time to build. For `mobile` and
+    `height_m` see `Arm.add_to_plant`.
     """
     plant, scene_graph = AddMultibodyPlant(
         MultibodyPlantConfig(

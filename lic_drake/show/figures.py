@@ -47,10 +47,6 @@ class ShownTrial:
     attempts: Sequence[Attempt]
     traces: Sequence[ReachTrace]
 
-    def labelled_traces(self) -> list[tuple[str, ReachTrace]]:
-        """Returns each trace with the number and outcome of its attempt."""
-        return [(f"attempt {i}: {a.record.outcome}", t) for i, (a, t) in enumerate(self, start=1)]
-
     def __iter__(self) -> Iterator[tuple[Attempt, ReachTrace]]:
         """Yields attempts with their traces."""
         return iter(zip(self.attempts, self.traces, strict=True))

@@ -27,10 +27,7 @@ SHRINK = 2
 def film_frames(trial: ShownTrial, cameras: CamerasConfig) -> Iterator[NDArray[np.uint8]]:
     """Yields the views of head and external camera side by side, shape (height, width, 3).
 
-    The head camera moves with the robot.
-
-    Raises:
-        RenderingError: Cameras cannot be simulated on this machine.
+    The head camera moves with the robot. A RenderingError says that there are no cameras here.
     """
     builder = DiagramBuilder()
     scene, *sensors = add_cameras(builder, trial.instance, trial.p_WG, cameras, ahead=True)

@@ -85,14 +85,8 @@ def choose_exhibits(
     """Returns the first trials that reach their goal and the first that do not.
 
     Environments are taken in order, so that nothing is cherry-picked; those whose goal is out of
-    the arm's reach are skipped.
-
-    Args:
-        library: Experience to learn from; it gives the scenario.
-        method: Strategy, see `lic_drake.select.registry.check_method`.
-        each: Number of successes, and of failures.
-        first_environment: Index of the environment to begin with.
-        say: Receives a message for every exhibit.
+    the arm's reach are skipped. There are at most `each` of both; `say` receives a message for
+    every one. The library gives the scenario, too.
     """
     scenario = library.scenario()
     selector = make_selector(

@@ -43,16 +43,9 @@ def save_pictures(
     """Writes demo.html, path.png and the stills of `lic_drake.show.stills.save_stills`.
 
     In the plane also density.png, in front of a board apertures.png, and with cameras look1.png and
-    so on, views.webp (a film of both cameras) and sequence.html (all of it on one page). Returns
-    the files by kind; a LicError says which cannot be written.
-
-    Args:
-        trial: What to show.
-        selector: Whose estimates to draw.
-        known: What the robot observed, or the feasible starts if it knows them.
-        out: The folder.
-        say: Receives a warning if stills cannot be rendered.
-        drake_models: See `lic_drake.show.stage.add_stage`.
+    so on, views.webp (a film of both cameras) and sequence.html (all of it on one page). The
+    estimates are the selector's; `known` is what the robot observed, or the feasible starts if it
+    knows them. Returns the files by kind; a LicError says which cannot be written.
     """
     attempts = trial.attempts
     recording = record_trial(trial, drake_models)
@@ -102,8 +95,8 @@ def path_figure(trial: ShownTrial) -> Figure:
     """Returns views of all attempts from above and, in space, from the side."""
     views = (TOP,) if trial.scenario.arm().is_planar else (TOP, SIDE)
     figure = Figure(figsize=(7 * len(views), 7), layout="constrained")
+    labelled = [(f"attempt {i}: {a.record.outcome}", t) for i, (a, t) in enumerate(trial, start=1)]
     for ax, axes in zip(figure.subplots(1, len(views), squeeze=False)[0], views, strict=True):
-        labelled = trial.labelled_traces()
         draw_view(ax, trial.scenario, trial.instance, trial.p_WG, labelled, axes)
     return figure
 

@@ -29,8 +29,7 @@ _HEAD_PARTS = ("head_pan_link", "head_tilt_link")  # One link of ours, in the to
 def find_drake_models() -> Path:
     """Returns the folder of the package, in ROS_PACKAGE_PATH or in the cache of Drake's downloads.
 
-    Raises:
-        ModelError: It is in neither of them.
+    A ModelError says that it is in neither.
     """
     packages = PackageMap.MakeEmpty()
     packages.PopulateFromRosPackagePath()

@@ -128,11 +128,7 @@ class Recording:
             self._follow(self._b0, self._approach.path(self._b0, self._q)[::-1])
 
     def save(self, path: Path) -> None:
-        """Writes the recording.
-
-        Raises:
-            LicError: The file cannot be written.
-        """
+        """Writes the recording; a LicError if the file cannot be written."""
         with readable_errors(path, "write"):
             path.write_text(self.html(), encoding="utf-8")
 

@@ -82,11 +82,7 @@ class StillCamera:
         p_WG: Vector,
         drake_models: Path | None = None,
     ) -> None:
-        """Builds the scene; see `lic_drake.show.stage.add_stage`.
-
-        Raises:
-            RenderingError: The renderer does not work on this machine, or not with these meshes.
-        """
+        """Builds the scene, see `lic_drake.show.stage.add_stage`; a RenderingError if it cannot."""
         builder = DiagramBuilder()
         self._scene = add_stage(builder, scenario, instance, drake_models)
         scene_graph = self._scene.scene_graph
