@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support.fake_reach import comparable, make_record
-from support.made_up import planar_library, small_cameras, sphere_library
+from support.made_up import BRIEF, NARROW, planar_library, small_cameras, sphere_library
 
 from lic_drake.errors import LibraryError, RequestError
 from lic_drake.evaluate import trial as dut
@@ -275,7 +275,7 @@ def test_strategies_are_compared_by_what_the_cameras_see(
         goals=1,
         attempts=1,
         scenario_name="foliage-aperture-clutter",
-        overrides="{stop: {timeout_s: 0.2}, clutter: {num_stems: 3, num_branches: 1}}",
+        overrides=f"{{{BRIEF}, {NARROW}, clutter: {{num_stems: 3, num_branches: 1}}}}",
         cameras=str(small_cameras(tmp_path / "small.yaml")),
     )
     run_evaluation(asked, say=quiet)

@@ -76,8 +76,8 @@ def test_every_simulated_row_is_drawn_once_and_differences_in_the_last_bit_are_f
 def test_rows_of_the_shipped_library_are_reproduced() -> None:
     # Not bit for bit: that holds on the processor that collected it.
     library = ExperienceLibrary(shipped_library("cylinder-clutter"))
-    found = list(recompute(library, 4, np.random.default_rng(3)))
-    assert len(found) == 4
+    found = list(recompute(library, 3, np.random.default_rng(3)))
+    assert len(found) == 3
     assert sum(old.outcome != new.outcome for old, new, _ in found) <= 1
 
 

@@ -37,7 +37,7 @@ ANGLES = st.tuples(*(st.floats(lo, hi) for lo, hi in zip(ARM.q_min, ARM.q_max, s
 PLACE = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
 
 
-@settings(deadline=None, max_examples=25)
+@settings(deadline=None, max_examples=15)
 @given(ANGLES, PLACE)
 def test_gaps_are_the_distances_that_drake_finds(
     angles: tuple[float, ...], place: tuple[float, float]

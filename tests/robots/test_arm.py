@@ -79,7 +79,7 @@ def test_answers_do_not_depend_on_earlier_ones_and_are_read_only(name: str) -> N
 
 
 @each_arm
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(3))
 def test_inverse_kinematics_bring_the_hand_to_its_pose(name: str, seed: int) -> None:
     arm = ARMS[name]
     q = middle(arm) if seed == 0 else angles_of(arm, np.random.default_rng(seed))

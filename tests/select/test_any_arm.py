@@ -27,10 +27,10 @@ SCENARIO = load_scenario(
 
 def test_it_is_collected_for_and_selected_for_as_any_other(tmp_path: Path) -> None:
     library = ExperienceLibrary(tmp_path / "library")
-    request = CollectionRequest(scenario=SCENARIO, environments=1, max_goals=2, max_starts=3)
-    assert collect(library, request).done == library.num_reaches == 2 * 3
+    request = CollectionRequest(scenario=SCENARIO, environments=1, max_goals=1, max_starts=3)
+    assert collect(library, request).done == library.num_reaches == 3
     columns = library.columns()
-    assert set(columns["robot"]) == {NAME} and 0 < columns["success"].sum() < 6
+    assert set(columns["robot"]) == {NAME} and 0 < columns["success"].sum() < 3
 
     arm = SCENARIO.arm()
     selector = make_selector("knn", arm, columns, category=SCENARIO.category)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.fake_reach import make_record
-from support.made_up import planar_library, small_cameras, sphere_library
+from support.made_up import BRIEF, NARROW, planar_library, small_cameras, sphere_library
 from support.mesh_package import write_drake_models
 
 from lic_drake.errors import LicError, RequestError
@@ -25,7 +25,7 @@ from lic_drake.show.demonstration import demonstrate
 PNG = b"\x89PNG"
 FOLIAGE = load_scenario(
     "foliage-aperture-clutter",
-    "{stop: {timeout_s: 0.2}, clutter: {num_stems: 1, num_branches: 1}}",
+    f"{{{BRIEF}, {NARROW}, clutter: {{num_stems: 1, num_branches: 1}}}}",
 )
 
 
@@ -42,8 +42,9 @@ def spheres(tmp_path_factory: pytest.TempPathFactory) -> ExperienceLibrary:
 
 @pytest.fixture(autouse=True)
 def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pictures of few pixels."""
+    """Pictures of few pixels and estimates."""
     monkeypatch.setattr("lic_drake.show.figures.DOTS_PER_INCH", 30)
+    monkeypatch.setattr("lic_drake.show.density.DENSITY_SHAPE", (21, 23))
     small = CameraConfig(width=320, height=240, focal_px=275.0)
     monkeypatch.setattr("lic_drake.show.stills.CAMERA", small)
 
@@ -64,11 +65,11 @@ def test_a_demonstration_writes_what_it_did_and_its_reaches_are_those_of_run_rea
     library: ExperienceLibrary, tmp_path: Path
 ) -> None:
     lines: list[str] = []
-    result = demonstrate(library.scenario(), library, "gp", 3, tmp_path / "new", say=lines.append)
+    result = demonstrate(library.scenario(), library, "gp1", 3, tmp_path / "new", say=lines.append)
     for kind in ("density", "path"):
         assert result.files[kind].read_bytes().startswith(PNG)
     data = json.loads(result.files["data"].read_text(encoding="utf-8"))
-    assert data["method"] == "gp"
+    assert data["method"] == "gp1"
     assert data["success"] == result.success == result.attempts[-1].record.success
     for attempt, stored in zip(result.attempts, data["attempts"], strict=True):
         assert attempt.record == run_reach(attempt.request)

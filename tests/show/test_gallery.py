@@ -18,7 +18,7 @@ from lic_drake.show.page import embed, make_page, pack, picture
 
 @pytest.fixture(scope="module")
 def exhibits(tmp_path_factory: pytest.TempPathFactory) -> list[Exhibit]:
-    scenario = load_scenario("passage-clutter", "{stop: {timeout_s: 7.0}}")
+    scenario = load_scenario("passage-clutter", "{stop: {timeout_s: 3.0, success_distance_m: 0.2}}")
     library = planar_library(tmp_path_factory.mktemp("passages") / "library", scenario)
     return choose_exhibits(library, "cost", say=lambda line: None)
 

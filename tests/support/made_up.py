@@ -13,6 +13,10 @@ from lic_drake.paths import shipped_library
 from lic_drake.reach.scenario import Scenario, load_scenario
 from support.fake_reach import make_record, make_request
 
+BRIEF = "stop: {timeout_s: 0.2}"
+NARROW = "task: {stand: {y_min_m: -0.1, y_max_m: 0.1, torso_min_m: 0.1, torso_max_m: 0.2}}"
+"""Nine places of the PR2's base and torso in the grid instead of 49."""
+
 
 def planar_library(path: Path, scenario: Scenario) -> ExperienceLibrary:
     """A library of the planar arm: starts to the left of the base succeed."""
@@ -40,7 +44,7 @@ def part_of_shipped(path: Path, category: str, environments: int) -> ExperienceL
 
 def sphere_library(path: Path) -> ExperienceLibrary:
     """A library of short reaches of the PR2: those from apertures near the goal succeed."""
-    scenario = load_scenario("sphere-aperture-clutter", "{stop: {timeout_s: 0.2}}")
+    scenario = load_scenario("sphere-aperture-clutter", f"{{{BRIEF}, {NARROW}}}")
     library = ExperienceLibrary(path)
     request = CollectionRequest(scenario=scenario, environments=1, max_goals=4)
     for environment in request.environment_indices:
