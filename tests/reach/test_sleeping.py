@@ -107,7 +107,7 @@ def test_where_waking_up_came_too_late_all_are_awake(monkeypatch: pytest.MonkeyP
 
 
 def test_the_pr2_stands_elsewhere_in_the_same_diagram() -> None:
-    scenario = load_scenario("sphere-aperture-clutter", "{stop: {timeout_s: 1.5}}")
+    scenario = load_scenario("sphere-aperture-clutter", "{stop: {timeout_s: 1.0}}")
     requests = random_requests(scenario, "calibration", 2, 1)
     start = requests[1].start
     requests[1] = replace(requests[1], start=replace(start, b0=[*start.b0[:2], 0.2]))

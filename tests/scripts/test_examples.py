@@ -40,7 +40,9 @@ def _quick(tmp_path, monkeypatch):
     monkeypatch.setattr(lic_drake, "shipped_library", part, raising=False)
     request = lic_drake.CollectionRequest
     monkeypatch.setattr(
-        lic_drake, "CollectionRequest", lambda **v: request(**{**v, "environments": 1})
+        lic_drake,
+        "CollectionRequest",
+        lambda **v: request(**{**v, "environments": 1, "max_starts": 2}),
     )
     forest = sklearn.ensemble.RandomForestClassifier
     monkeypatch.setattr(sklearn.ensemble, "RandomForestClassifier", lambda _, **v: forest(5, **v))
