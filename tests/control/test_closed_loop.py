@@ -40,18 +40,21 @@ def run(
 
 
 # From the start line into the goal area, from the right and from the left.
-FREE_REACHES = [((0.335, -0.4, 0.0), (0.7, -0.2)), ((0.335, 0.3, 90.0), (0.45, 0.35))]
+FROM_THE_RIGHT, FROM_THE_LEFT = (
+    ((0.335, -0.4, 0.0), (0.7, -0.2)),
+    ((0.335, 0.3, 90.0), (0.45, 0.35)),
+)
 
 
-@pytest.mark.parametrize(("start", "goal"), FREE_REACHES)
 @pytest.mark.parametrize(
-    ("preset", "time", "bend"),
+    ("preset", "time", "bend", "start", "goal"),
     [
         # At 0.05 m/s the hand keeps to the line; it lags by half a second, each joint its own way.
-        ("ijrr_2013", 12.0, 0.1),
+        ("ijrr_2013", 12.0, 0.1, *FROM_THE_LEFT),
         # 0.5 m/s is more than half a degree a step allows: the joints turn at their limits, and
         # the hand takes a bend of up to a third of the distance.
-        ("haptic_mpc_2013", 7.5, 0.45),
+        ("haptic_mpc_2013", 7.5, 0.45, *FROM_THE_RIGHT),
+        ("haptic_mpc_2013", 7.5, 0.45, *FROM_THE_LEFT),
     ],
 )
 def test_in_free_space_the_hand_comes_to_the_goal_and_stays_there(

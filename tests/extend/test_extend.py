@@ -138,14 +138,17 @@ def test_the_command_line_collects_learns_and_selects_with_all_three(
     environment: dict[str, str],
     extend: Extensions,
     tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
+    for name, value in environment.items():  # The worker process has nothing else.
+        monkeypatch.setenv(name, value)
     library = str(tmp_path / "library")
     limits = ("--environments", "1", "--max-goals", "3", "--max-starts", "2", "--workers", "1")
     fewer = "{clutter: {num_boxes: 2}, stop: {timeout_s: 0.2, success_distance_m: 0.35}}"
     scenario = ("--scenario", str(SCENARIO), "--set", fewer)
-    command = [sys.executable, "-m", "lic_drake", "collect", library, *scenario, *limits]
-    subprocess.run(command, capture_output=True, check=True, env=environment)
+    assert main(["collect", library, *scenario, *limits]) == 0
+    capsys.readouterr()
     records = ExperienceLibrary(library).records()
     assert {(r.category, r.robot) for r in records} == {("shelf-clutter", "long-arm")}
     assert 0 < sum(record.success for record in records) < len(records) == 6

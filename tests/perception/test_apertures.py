@@ -86,7 +86,7 @@ def test_other_boards_are_found_by_their_rows_columns_and_size() -> None:
 
 def test_errors_of_noisy_depths_are_as_large_as_the_covariances_say() -> None:
     instance = draw(BARE)
-    image = look(instance, width=640)
+    image = look(instance, width=480)
     camera = CameraConfig()
     off, squared = [], []
     for index in range(3):
