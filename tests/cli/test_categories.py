@@ -62,6 +62,7 @@ def test_collect_makes_the_papers_reaches_in_each_environment(
     assert main(["experience", "check", str(path)]) == 0
 
 
+@pytest.mark.usefixtures("_here")
 def test_a_real_reach_through_an_aperture_is_collected_and_comes_out_the_same_again(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -10,7 +10,10 @@ import numpy as np
 import pytest
 from support.ray_casting import blank, draw_ball, draw_instance, tilted
 
+from lic_drake.cli.main import main
 from lic_drake.clutter.foliage import FoliageApertureClutter
+from lic_drake.errors import RenderingError
+from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.perception.cameras import Views, take_views
 from lic_drake.perception.config import CameraConfig, CamerasConfig, ExternalConfig, HeadConfig
 from lic_drake.seeds import make_generator
@@ -60,19 +63,30 @@ def test_the_external_camera_sees_the_ball_where_it_is(views: Views) -> None:
     assert abs(rows.mean() - row) < 1.0
 
 
-def test_without_graphics_libraries_the_foliage_demo_is_refused_in_one_line_before_it_learns(
-    tmp_path: Path,
-) -> None:
+def test_without_graphics_libraries_it_is_said_what_to_install(tmp_path: Path) -> None:
     for name in ("libEGL.so.1", "libEGL.so"):
         (tmp_path / name).touch()
-    demo = ["demo", "--robot", "pr2", "--category", "foliage-aperture-clutter"]
+    script = "from lic_drake.perception.cameras import make_renderer; make_renderer()"
     result = subprocess.run(
-        [sys.executable, "-m", "lic_drake", *demo, "--out", str(tmp_path / "out")],
+        [sys.executable, "-c", script],
         env={**os.environ, "LD_LIBRARY_PATH": str(tmp_path)},
         capture_output=True,
         text=True,
     )
-    assert (result.returncode, result.stdout) == (2, "")
-    assert result.stderr.startswith("lic: error: cameras cannot be simulated: ")
-    assert result.stderr.endswith("apt-get install libegl1 libgl1 libgl1-mesa-dri\n")
-    assert result.stderr.count("\n") == 1
+    assert result.returncode == 1
+    last = result.stderr.splitlines()[-1]
+    assert "RenderingError: cameras cannot be simulated: " in last
+    assert last.endswith("apt-get install libegl1 libgl1 libgl1-mesa-dri")
+
+
+def test_without_cameras_the_foliage_demo_is_refused_in_one_line_before_it_learns(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail() -> None:
+        raise RenderingError("cameras cannot be simulated: it is dark")
+
+    monkeypatch.setattr("lic_drake.show.demonstration.make_renderer", fail)
+    monkeypatch.setattr(ExperienceLibrary, "columns", lambda library: pytest.fail("it learns"))
+    demo = ["demo", "--robot", "pr2", "--category", "foliage-aperture-clutter"]
+    assert main([*demo, "--out", str(tmp_path / "out")]) == 2
+    assert capsys.readouterr() == ("", "lic: error: cameras cannot be simulated: it is dark\n")

@@ -65,8 +65,12 @@ class DaskCluster:
     def _start(self, *arguments: str) -> Process:
         process = subprocess.Popen(
             [sys.executable, *arguments],
-            # A task that kills its worker is given up sooner than by default, after 3 more deaths.
-            env=environment(DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES="1"),
+            # A task that kills its worker is given up sooner than by default, after 3 more deaths;
+            # and workers do not watch all the time what they are doing.
+            env=environment(
+                DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES="1",
+                DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED="False",
+            ),
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             start_new_session=True,
