@@ -54,6 +54,17 @@ def _renderer() -> None:
 
 
 @pytest.fixture
+def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Demonstrations draw few pixels and few estimates."""
+    from lic_drake.perception.config import CameraConfig
+
+    monkeypatch.setattr("lic_drake.show.figures.DOTS_PER_INCH", 30)
+    monkeypatch.setattr("lic_drake.show.density.DENSITY_SHAPE", (21, 23))
+    small = CameraConfig(width=320, height=240, focal_px=275.0)
+    monkeypatch.setattr("lic_drake.show.stills.CAMERA", small)
+
+
+@pytest.fixture
 def registries_restored(monkeypatch: pytest.MonkeyPatch) -> None:
     """What the test registers is forgotten afterwards."""
     from lic_drake.clutter import registry as clutter

@@ -115,6 +115,7 @@ def test_select_takes_goals_that_a_base_aside_can_reach(
     assert "and the arm reaches 0.833 m; choose a nearer goal" in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("_coarse")
 @pytest.mark.parametrize("library", [PASSAGE], indirect=True)
 def test_demo_shows_the_librarys_category(
     library: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -14,13 +14,15 @@ from support.mesh_package import write_drake_models
 
 from lic_drake.errors import LicError, RequestError
 from lic_drake.experience.store import ExperienceLibrary
-from lic_drake.perception.config import CameraConfig, load_cameras
+from lic_drake.perception.config import load_cameras
 from lic_drake.perception.observer import Observer
 from lic_drake.reach.request import ReachRequest
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.session import run_reach
 from lic_drake.reach.start import Start
 from lic_drake.show.demonstration import demonstrate
+
+pytestmark = pytest.mark.usefixtures("_coarse")
 
 PNG = b"\x89PNG"
 FOLIAGE = load_scenario(
@@ -38,15 +40,6 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> ExperienceLibrary:
 @pytest.fixture(scope="module")
 def spheres(tmp_path_factory: pytest.TempPathFactory) -> ExperienceLibrary:
     return sphere_library(tmp_path_factory.mktemp("spheres"))
-
-
-@pytest.fixture(autouse=True)
-def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pictures of few pixels and estimates."""
-    monkeypatch.setattr("lic_drake.show.figures.DOTS_PER_INCH", 30)
-    monkeypatch.setattr("lic_drake.show.density.DENSITY_SHAPE", (21, 23))
-    small = CameraConfig(width=320, height=240, focal_px=275.0)
-    monkeypatch.setattr("lic_drake.show.stills.CAMERA", small)
 
 
 @pytest.fixture
