@@ -26,10 +26,15 @@ settings.register_profile(
 settings.load_profile("lic")
 
 
+# Imports make most of the objects, and all of them stay: the garbage collector is spared them.
+gc.disable()
+
+
 def pytest_collection_finish() -> None:
-    """Spares the garbage collector what imports have made, most of the objects: all of it stays."""
+    """Leaves to the garbage collector what the tests make."""
     gc.collect()
     gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope="session")

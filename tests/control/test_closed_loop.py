@@ -119,7 +119,7 @@ def test_a_movable_cylinder_is_pushed_away_and_the_goal_reached(preset: str) -> 
     obstacle = cylinder(*(p_RL[2] + 0.25 * along + 0.028 * across)[:2], movable=True)
     goal = ARM.calc_pose(q).p_RE + 0.12 * across
     _, p_WE, _, objects = run(
-        f"{{mpc: {{preset: {preset}}}}}", make_clutter(obstacle), q, goal, 10.0
+        f"{{mpc: {{preset: {preset}}}}}", make_clutter(obstacle), q, goal, 7.0
     )
     distance = np.linalg.norm(p_WE - goal[:2], axis=1)
     assert np.min(distance) < SUCCESS

@@ -54,7 +54,7 @@ def test_a_step_moves_hand_and_force_as_predicted_once_the_arm_has_settled() -> 
 
     # How stiff the contact is, from one small step towards it.
     world.set_equilibrium(q_d + 0.01 * row / np.linalg.norm(row))
-    world.advance(4.0)
+    world.advance(2.5)
     k = (world.taxel_force.sum() - before.forces[0]) / (row @ (world.q - before.q))
     assert 2e4 < k < 1e5
     config = MpcConfig(contact_stiffness_N_per_m=float(k))
@@ -62,11 +62,11 @@ def test_a_step_moves_hand_and_force_as_predicted_once_the_arm_has_settled() -> 
 
     for goal in ((0.3, 0.0, 0.0), (-0.3, 0.1, 0.0), (0.1, -0.4, 0.0)):
         world.set_equilibrium(q_d)
-        world.advance(4.0)
+        world.advance(2.5)
         start = measure(world, q_d, goal)
         step = mpc.step(start)
         world.set_equilibrium(q_d + step)
-        world.advance(4.0)
+        world.advance(2.5)
         model = mpc.predict(start)
         moved = ARM.calc_pose(world.q).p_RE - ARM.calc_pose(start.q).p_RE
         expected = model.tip @ step
