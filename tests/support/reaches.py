@@ -21,7 +21,8 @@ def free_space(timeout_s: float = 20.0) -> Scenario:
     return load_scenario(
         "cylinder-clutter",
         "{clutter: {num_movable: 0, num_fixed: 0},"
-        f" stop: {{timeout_s: {timeout_s}, force_limit_N: 100}}}}",
+        f" mpc: {{preset: haptic_mpc_2013}}, stop: {{timeout_s: {timeout_s},"
+        " force_limit_N: 100, stuck_distance_m: 0.005, stuck_time_s: 3.0}}",
     )
 
 
@@ -30,7 +31,8 @@ def small_clutter(timeout_s: float = 3.0) -> Scenario:
     return load_scenario(
         "cylinder-clutter",
         "{clutter: {num_movable: 6, num_fixed: 6, lower: [0.4, -0.3], upper: [0.7, 0.3]},"
-        f" stop: {{timeout_s: {timeout_s}, force_limit_N: 100}}}}",
+        f" mpc: {{preset: haptic_mpc_2013}}, stop: {{timeout_s: {timeout_s},"
+        " force_limit_N: 100, stuck_distance_m: 0.005, stuck_time_s: 3.0}}",
     )
 
 
