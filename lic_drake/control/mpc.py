@@ -137,9 +137,9 @@ PRESETS: dict[str, Callable[[], MpcConfig]] = {
 """The published parameter sets by name.
 
 haptic_mpc_2013 is the later controller, 25 Hz, up to 0.5 m/s (hrl_haptic_mpc, simulated 3 links);
-ijrr_2013 the one of the paper's reference [1], 100 Hz, 0.05 m/s; ijrr_2013_25hz the same per second in
-four times longer steps (notebooks/results/calibration); pr2 the later one with its values for the
-PR2 (3 N: paper V-A).
+ijrr_2013 the one of the paper's reference [1], 100 Hz, 0.05 m/s; ijrr_2013_25hz the same in four
+times longer steps (notebooks/results/calibration); pr2 the later one with its values for the PR2
+(3 N: paper V-A).
 """
 
 

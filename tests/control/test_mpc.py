@@ -27,7 +27,9 @@ def test_the_presets_have_the_published_values() -> None:
         *(0.1, np.inf, 0.0, 10.0, 0.5, 30.0, 45.0, True, True, 0.0),
     ]
     speeds = {name: make().tip_step_m / make().period_s for name, make in PRESETS.items()}
-    assert speeds == pytest.approx({"haptic_mpc_2013": 0.5, "ijrr_2013": 0.05, "pr2": 0.5})
+    assert speeds == pytest.approx(
+        {"haptic_mpc_2013": 0.5, "ijrr_2013": 0.05, "ijrr_2013_25hz": 0.05, "pr2": 0.5}
+    )
     assert PRESETS["pr2"]().force_threshold_N == 3.0
 
 
