@@ -65,17 +65,20 @@ def corridor_cost(x0: Vector, p_WG: Vector, hand: Hand) -> Vector:
 
 @dataclass(frozen=True, kw_only=True)
 class RandomSelector:
-    """RND: any of the discrete starts, all equally likely; a retry takes any other one."""
+    """RND: any of the discrete starts, all equally likely in every attempt (VI-A).
+
+    The paper rules out the failed start and what is near it for COST only, so RND may repeat one.
+    """
 
     rng: np.random.Generator
     method: str = "rnd"
 
     def select(self, situation: Situation) -> Selection:
-        """Draws a start; a RequestError if all have failed."""
+        """Draws a start; a RequestError if there is none."""
         began = time.perf_counter()
-        choices = situation.starts.grid.take(situation.untried(situation.starts.grid))
+        choices = situation.starts.grid
         if len(choices) == 0:
-            raise RequestError("all discrete starts have failed; no start is left to draw")
+            raise RequestError("no discrete start is feasible here, so there is none to draw")
         start = choices[int(self.rng.integers(len(choices)))]
         return Selection(start, None, self.method, time.perf_counter() - began)
 

@@ -66,10 +66,6 @@ class Situation:
         """Returns which of n starts are far enough from all failed ones, shape (n,)."""
         return self._away(some, self.retry_distance_m)
 
-    def untried(self, some: Starts) -> BoolVector:
-        """Returns which of n starts have not failed themselves, shape (n,)."""
-        return self._away(some, RETRY_DISTANCES_M[-1])
-
     def free_regions(self) -> tuple[Region, ...]:
         """Returns the parts of the regions that are away from all failed attempts.
 

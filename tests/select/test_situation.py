@@ -71,7 +71,6 @@ def test_the_neighbourhood_of_failures_is_as_large_as_leaves_a_start_of_the_grid
             for x0, b0 in zip(grid.x0, grid.b0, strict=True)
         ]
     )
-    np.testing.assert_array_equal(situation.untried(grid), ~repeated)
     for distance in (0.1, 0.05, 0.025, 0.0, -1.0):
         expected = ~repeated & (nearest > distance + 1e-9)
         if expected.any() or distance < 0.0:
