@@ -25,6 +25,7 @@ from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.robots.registry import get_robot
 from lic_drake.select.baselines import Hand, corridor_cost
 from lic_drake.types import Vector
+from scripts.ablation.counts import BinomialProcess, DirichletProcess
 from scripts.common import RESULTS, make_parser, run_script
 from scripts.cross_validation.scores import log_loss
 
@@ -155,6 +156,8 @@ def first_reaches(path: Path, columns: Columns, folds: int) -> list[dict[str, An
     variants: dict[str, tuple[Callable[[], SuccessEstimator], Vector]] = {
         name: (partial(make_estimator, name), rows.X) for name in ("gp", "knn")
     }
+    variants["gp, Dirichlet"] = (DirichletProcess, rows.X)
+    variants["gp, binomial"] = (BinomialProcess, rows.X)
     for share in (0.01, 0.2, 0.3):
         name = f"knn, bandwidths of {share} standard deviations"
         variants[name] = (partial(FixedBandwidth, share), rows.X)

@@ -19,6 +19,7 @@ def main() -> None:
     parser.add_argument("--environments", type=int, default=40)
     parser.add_argument("--goals", type=int, default=1, help="random goals in each environment")
     parser.add_argument("--common-goals", action="store_true", help="the same goals in all of them")
+    parser.add_argument("--grid-goals", action="store_true", help="those of a collection instead")
     parser.add_argument("--stream", default="evaluation", help="seed stream of the environments")
     parser.add_argument("--set", default="", metavar="YAML", help="values put over the scenario")
     parser.add_argument("--still", action="store_true", help="base and torso of a PR2 stay")
@@ -30,9 +31,9 @@ def main() -> None:
     for environment in range(args.environments):
         instance = scenario.sample_instance(args.stream, environment)
         grid = (board_starts if args.still else make_starts)(scenario, instance).grid.without_q()
-        for goal in range(args.goals):
-            at = 0 if args.common_goals else environment
-            p_WG = scenario.sample_goal(args.stream, at, goal)
+        at = 0 if args.common_goals else environment
+        goals = [scenario.sample_goal(args.stream, at, goal) for goal in range(args.goals)]
+        for p_WG in scenario.goals(args.stream, environment) if args.grid_goals else goals:
             requests += [
                 ReachRequest(scenario, args.stream, environment, p_WG, start) for start in grid
             ]
