@@ -3,6 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.special import expit
 from support.made_up import part_of_shipped
 
 from lic_drake.estimate.features import ExperienceRows, FeatureMap
@@ -10,6 +11,7 @@ from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 from lic_drake.types import Vector
 from scripts.ablation import run, space_features
+from scripts.ablation.counts import BinomialProcess, CountProcess, DirichletProcess
 from scripts.ablation.space_features import AGAIN, LOCAL, RELATIVE, second_table
 from scripts.cross_validation import run as cross_validation
 
@@ -123,3 +125,24 @@ def test_cross_validation_writes_scores_and_calibration(library: Path, tmp_path:
     with (tmp_path / "calibration_curves.csv").open() as file:
         counts = [int(row["count"]) for row in csv.DictReader(file) if row["estimator"] == "knn"]
     assert np.sum(counts) == 1890
+
+
+@pytest.mark.parametrize("make", [DirichletProcess, BinomialProcess])
+def test_processes_of_counts_learn_a_smooth_probability(make: type[CountProcess]) -> None:
+    rng = np.random.default_rng(0)
+    cells = np.linspace(0.0, 1.0, 80)
+    X = np.repeat(cells, 6)[:, None]
+    true = 0.5 + 0.4 * np.sin(2.0 * np.pi * cells)
+    y = (rng.uniform(size=480) < np.repeat(true, 6)).astype(float)
+    estimator = make().fit(X, y, np.tile(np.arange(6), 80))
+    learned, counted = estimator.values(cells[:, None]), y.reshape(80, 6).mean(axis=1)
+    assert np.abs(learned - true).mean() < 0.8 * np.abs(counted - true).mean()
+
+
+def test_laplaces_approximation_ends_at_the_mode() -> None:
+    x = np.linspace(0.0, 1.0, 12)
+    K = 2.0 * np.exp(-3.0 * np.abs(x[:, None] - x))
+    wins, tries = np.arange(12.0), np.full(12, 12.0)
+    _, mean, alpha = BinomialProcess()._condition(K, wins, tries)
+    # The gradient of the log likelihood is that of the prior, K^-1 (f - mean).
+    np.testing.assert_allclose(alpha, wins - tries * expit(mean + K @ alpha), atol=1e-6)
