@@ -172,7 +172,7 @@ def first_reaches(path: Path, columns: Columns, folds: int) -> list[dict[str, An
     values["RND"] = np.zeros(len(rows.y))
     columns |= {"_lic1": values["gp"], "_cost": -values["COST"], "_fold": fold}
 
-    order, size = _blocks(columns, ("stream", "environment", "goal_x", "goal_y"))
+    order, size = blocks(columns, ("stream", "environment", "goal_x", "goal_y"))
     choices = Choices(
         rows.y[order].reshape(-1, size),
         np.ones(len(order) // size),
@@ -192,7 +192,7 @@ def second_reaches(path: Path, columns: Columns) -> list[dict[str, Any]]:
     """Compares variants of LIC-2 after failures of LIC-1 and after likely failures."""
     category = features_of(columns["category"][0])
     pairs = pair_reaches(columns)
-    size = _blocks(columns, ("stream", "environment", "goal_x", "goal_y"))[1]
+    size = blocks(columns, ("stream", "environment", "goal_x", "goal_y"))[1]
     estimate = pairs["_lic1"].reshape(-1, size)
     near = np.abs(pairs["start_y"] - pairs["first_start_y"]).reshape(-1, size)
     near_start = near <= RETRY_DISTANCE_M + 1e-9
@@ -253,7 +253,7 @@ def second_reaches(path: Path, columns: Columns) -> list[dict[str, Any]]:
     ]
 
 
-def _blocks(columns: Columns, task: tuple[str, ...]) -> tuple[NDArray[np.intp], int]:
+def blocks(columns: Columns, task: tuple[str, ...]) -> tuple[NDArray[np.intp], int]:
     """Returns the order that puts reaches of one task together, and how many they are."""
     codes = [np.unique(columns[name], return_inverse=True)[1].ravel() for name in task]
     _, index = np.unique(np.column_stack(codes), axis=0, return_inverse=True)
