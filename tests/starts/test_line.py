@@ -59,7 +59,7 @@ def test_at_apertures_every_pose_of_the_line_is_there_that_the_track_allows() ->
             (round(p_WA[1], 9), round(p_WA[1] - y, 9), round(phi, 9))
             for p_WA in APERTURES.p_WA
             for _, y, phi in poses.x0
-            if -0.6 <= round(p_WA[1] - y, 9) <= 0.6
+            if abs(round(p_WA[1] - y, 9)) <= 0.8
         }
         found = [tuple(np.round([s.x0[1], s.b0[1], s.x0[2]], 9)) for s in some]
         assert len(found) == len(expected)
@@ -114,7 +114,7 @@ def test_the_same_number_of_starts_is_tried_at_each_aperture() -> None:
     p_WA = SCENARIO.sample_instance("training", 3).p_WA
     assert p_WA is not None
     np.testing.assert_array_equal(y, np.sort(p_WA[:, 1]))
-    assert counts.tolist() == [5, 5, 5]
+    assert counts.tolist() == [3, 3, 3, 3, 3]
     assert len(np.unique(np.hstack([tried.x0, tried.b0]), axis=0)) == 15
     # They are a function of stream and environment.
     again = training_starts(load_scenario("cylinder-aperture-clutter"), "training", 3)
@@ -135,7 +135,7 @@ def test_an_aperture_out_of_the_tracks_reach_is_named() -> None:
     [
         (APERTURES, [0.335, 0.1, 0.2], [0.0, 0.2, 0.0]),  # Between two apertures.
         (APERTURES, [0.335, 0.05, 0.2], [0.001, 0.2, 0.0]),  # The base beside its track.
-        (APERTURES, [0.335, 0.52, 0.5], [0.0, 0.75, 0.0]),  # The base beyond its track's end.
+        (APERTURES, [0.335, 0.52, 0.5], [0.0, 0.85, 0.0]),  # The base beyond its track's end.
         (APERTURES, [0.335, 0.05, 0.9], [0.0, 0.1, 0.0]),  # A hand turned too far.
         (APERTURES, [0.335, 0.05, -0.7], [0.0, 0.0, 0.0]),  # Beyond the joint limits.
         (LINE, [0.335, 0.3, 0.0], [0.0, 0.0, 0.0]),  # Beyond the joint limits.
