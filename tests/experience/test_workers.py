@@ -101,7 +101,7 @@ def test_of_concurrent_collections_shares_fill_one_library_and_any_other_is_reje
     hold = tmp_path / "hold"
     hold.touch()
     first = start(library.path, replace(reach, hold=hold), "--workers", "1", "--share", "1/2")
-    wait_until(lambda: any(library.path.glob("*.yaml")))
+    wait_until(lambda: any(library.path.glob("_collecting*.lock")))
     for other in ("1/1", "1/2", "1/3"):
         assert main(["collect", str(library.path), *OPTIONS, "--share", other]) == 2
         assert f"another process is adding to {library.path} (it holds" in capsys.readouterr().err

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from pydrake.math import RollPitchYaw, RotationMatrix
 from scipy.stats import chisquare
@@ -94,7 +94,7 @@ def test_of_equally_cheap_starts_cost_takes_the_base_nearest_to_the_goals_y(
     grid = APERTURES.grid
     costs = np.array([corridor_cost(x0[None], p_WG, HAND)[0] for x0 in grid.x0])
     equal = costs <= costs.min() + 1e-9
-    assert np.unique(grid.b0[equal], axis=0).shape[0] > 1
+    assume(np.unique(grid.b0[equal], axis=0).shape[0] > 1)
     assert corridor_cost(chosen.start.x0[None], p_WG, HAND)[0] == pytest.approx(
         costs.min(), abs=1e-9
     )
