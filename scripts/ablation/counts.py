@@ -5,6 +5,7 @@ sigmoid(f). Reaches in one environment are correlated, so counts are divided by 
 effect. The signal variance of f maximises the (approximate) marginal likelihood over a grid.
 """
 
+from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Any
 
@@ -43,12 +44,12 @@ class CountProcess(SuccessEstimator):
         correlation = l1_correlation(self._X, X, self._theta)
         return np.asarray(expit(self._mean + self._alpha @ correlation))
 
+    @abstractmethod
     def _condition(self, K: Vector, wins: Vector, tries: Vector) -> tuple[float, float, Vector]:
         """Returns the log likelihood, the mean of f, and K^-1 (f - mean) at its mode, shape (m,).
 
         K is the prior covariance, shape (m, m); wins and tries are of m rows.
         """
-        raise NotImplementedError
 
 
 class DirichletProcess(CountProcess):

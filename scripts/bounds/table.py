@@ -222,7 +222,7 @@ def _estimates(name: str, category: str, learned: Columns, asked: Columns) -> Ve
     return fit_model(name, features, learned).estimator.values(features.rows(asked).X)
 
 
-def _cost_score(columns: Columns) -> Vector:
+def cost_score(columns: Columns) -> Vector:
     """Returns COST's score of each reach: bases break ties as in its selector, shape (n,)."""
     x0 = np.column_stack([columns[name] for name in ("start_x", "start_y", "start_phi")])
     p_WG = np.column_stack([columns[name] for name in ("goal_x", "goal_y", "goal_z")])
@@ -245,7 +245,7 @@ def category_table(results: Path, category: str) -> Table:
     factorial = load_factorial(ExperienceLibrary(folder / "factorial").columns())
     columns = factorial.columns
     library = ExperienceLibrary(shipped_library(category)).columns()
-    scores = {"cost": _cost_score(columns)}
+    scores = {"cost": cost_score(columns)}
     scores |= {name: _estimates(name, category, library, columns) for name in LEARNED}
     bounds = (
         aperture_bounds(factorial, results) if category == APERTURES else compute_bounds(factorial)

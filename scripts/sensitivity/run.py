@@ -21,8 +21,8 @@ from lic_drake.evaluate.table import Table
 from lic_drake.experience.collect import CollectionRequest
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.scenario import load_scenario
-from lic_drake.select.baselines import Hand, corridor_cost
 from scripts.ablation.run import Choices, blocks, held_out_values
+from scripts.bounds.table import cost_score
 from scripts.common import add_workers, keep_reaches, make_parser, run_script, write_report
 
 GOALS = "task: {goal_area: {step_m: 0.2}}"
@@ -49,17 +49,12 @@ def compare(library: ExperienceLibrary) -> tuple[str, ...]:
     columns = library.columns()
     rows = PLANAR_LIC1.rows(columns)
     order, size = blocks(columns, ("stream", "environment", "goal_x", "goal_y"))
-    x0 = np.column_stack([columns[f"start_{name}"] for name in ("x", "y", "phi")])
-    p_WG = np.column_stack([columns[f"goal_{name}"] for name in "xyz"])
-    hand = Hand.of(library.scenario().arm())
-    cost = [corridor_cost(x0[i : i + 1], p_WG[i], hand)[0] for i in range(len(x0))]
-    make = partial(make_estimator, "gp")
-    estimate = held_out_values(make, rows, group_folds(rows.groups, 10))
     success, environment = rows.y[order].reshape(-1, size), rows.groups[order][::size]
     choices = Choices(success, np.ones(len(success)), environment)
+    make = partial(make_estimator, "gp")
+    estimate = held_out_values(make, rows, group_folds(rows.groups, 10))
     lic = choices.share(estimate[order].reshape(-1, size))
-    # Rounded, so that mirrored starts tie.
-    by_cost = choices.share(-np.round(np.array(cost)[order].reshape(-1, size), 9))
+    by_cost = choices.share(cost_score(columns)[order].reshape(-1, size))
     found = (choices.success.mean(axis=1), by_cost, lic, choices.success.max(axis=1), lic - by_cost)
     cells = ["{:.1f} ± {:.1f}".format(*choices.mean(values)) for values in found]
     return (*cells, f"{mcnemar(lic > 0.5, by_cost > 0.5):.2g}")

@@ -1,3 +1,5 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -6,15 +8,11 @@ from pydrake.math import RollPitchYaw, RotationMatrix
 from scipy.stats import chisquare
 from support.starts import APERTURES, ARM, LINE
 
+from lic_drake.errors import RequestError
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.start import Start
 from lic_drake.robots.registry import get_robot
-from lic_drake.select.baselines import (
-    CostSelector,
-    Hand,
-    RandomSelector,
-    corridor_cost,
-)
+from lic_drake.select.baselines import CostSelector, Hand, RandomSelector, corridor_cost
 from lic_drake.select.situation import FailedReach, Situation
 from lic_drake.starts import make_starts
 
@@ -69,6 +67,13 @@ def test_random_selector_draws_any_start_again_after_failures() -> None:
     situation = Situation(p_WG=GOAL, starts=LINE, failed=failed)
     drawn = {tuple(selector.select(situation).start.x0) for _ in range(300)}
     assert drawn == set(map(tuple, LINE.grid.x0))
+
+
+def test_random_selector_without_any_start_says_so() -> None:
+    nowhere = SimpleNamespace(grid=LINE.grid.take(np.zeros(0, dtype=int)))
+    situation = Situation(p_WG=GOAL, starts=nowhere)
+    with pytest.raises(RequestError, match="no discrete start is feasible here"):
+        RandomSelector(rng=np.random.default_rng(1)).select(situation)
 
 
 def test_cost_takes_the_cheapest_start_and_then_the_cheapest_away_from_it() -> None:
