@@ -40,18 +40,10 @@ def add_parser(subparsers: Subparsers) -> None:
     add_count(parser, "--environments", 200, "number of environments")
     add_count(parser, "--goals", 1, "goals per environment")
     add_count(parser, "--attempts", 2, "maximum number of attempts at a goal")
-    for name, text in (
-        ("--common-goals", "same goals in all environments (default: new ones in each)"),
-        ("--fresh", "reset the environment before later attempts (default: as it was left)"),
-        ("--still", "keep base and torso of a PR2 fixed (default: they move along the board)"),
-    ):
-        parser.add_argument(name, action="store_true", help=text)
     parser.add_argument(
-        "--second-attempts",
-        type=Path,
-        metavar="FOLDER",
-        help="library of simulated second attempts for LIC-2 (default: pairs of single reaches,"
-        " as in the paper)",
+        "--still",
+        action="store_true",
+        help="keep base and torso of a PR2 fixed (default: they move along the board)",
     )
     parser.add_argument(
         "--cameras",
@@ -65,7 +57,7 @@ def add_parser(subparsers: Subparsers) -> None:
         default="",
         metavar="NAME",
         help="label that keeps these trials apart from others in the folder (default: those of"
-        " fresh, still and cameras that are given)",
+        " still and cameras that are given)",
     )
     bench = add_command(
         subparsers,
@@ -87,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
     from lic_drake.evaluate.trials import TrialTable
     from lic_drake.paths import shipped_library
 
-    given = (name for name in ("fresh", "still", "cameras") if getattr(args, name))
+    given = (name for name in ("still", "cameras") if getattr(args, name))
     variant = args.variant or "-".join(given)
     evaluation = Evaluation(
         experience=args.library or shipped_library(DEFAULT_SCENARIO),
@@ -97,9 +89,6 @@ def run(args: argparse.Namespace) -> int:
         goals=args.goals,
         attempts=args.attempts,
         stream=args.stream or "evaluation",
-        common_goals=args.common_goals,
-        second_attempts=args.second_attempts,
-        fresh=args.fresh,
         variant=variant,
         overrides=args.set,
         moves=not args.still,

@@ -79,6 +79,13 @@ class CylinderApertureClutter(CylinderClutter):
                 f"apertures at y {low} to {high} do not fit into a barrier of"
                 f" {self.barrier_length_m} m; increase barrier_length_m"
             )
+        room = self._aperture_distance * (self.num_apertures - 1)
+        if room > high - low:
+            raise ScenarioError(
+                f"{self.num_apertures} apertures need {room:.3g} m between the outermost centres,"
+                f" but aperture_y_min_m {low} to aperture_y_max_m {high} is less; use fewer or"
+                " narrower ones"
+            )
         front = self.lower[0] - self.radius_m
         if front < self.barrier_x_m + 0.5 * self.barrier_thickness_m:
             raise ScenarioError(
@@ -86,16 +93,22 @@ class CylinderApertureClutter(CylinderClutter):
                 f" {self.barrier_x_m} m; raise lower or reduce barrier_x_m"
             )
 
+    @property
+    def _aperture_distance(self) -> float:
+        """Least distance of neighbouring apertures' centres, metres."""
+        return 2.0 * self.aperture_width_m
+
     def sample(self, rng: np.random.Generator) -> ClutterInstance:
-        """Samples cylinders as in cylinder-clutter, then uniform openings two widths apart."""
+        """Samples cylinders as in cylinder-clutter, then openings at least two widths apart."""
         cylinders = super().sample(rng)
-        x = self.barrier_x_m
-        low, high = [x, self.aperture_y_min_m], [x, self.aperture_y_max_m]
-        centres = place_discs(rng, self.num_apertures, low, high, 2.0 * self.aperture_width_m)
-        centres = centres[np.argsort(centres[:, 1])]
-        p_WA = np.column_stack([centres, np.zeros(len(centres))])
+        # Uniform among all centres that keep their distance, without rejection: what is left of the
+        # range beyond the distances is divided at random.
+        distances = self._aperture_distance * np.arange(self.num_apertures)
+        high = self.aperture_y_max_m - distances[-1]
+        y = distances + np.sort(rng.uniform(self.aperture_y_min_m, high, self.num_apertures))
+        x, half = self.barrier_x_m, 0.5 * self.barrier_length_m
+        p_WA = np.column_stack([np.full_like(y, x), y, np.zeros_like(y)])
         # The parts of the barrier between the openings.
-        half, y = 0.5 * self.barrier_length_m, centres[:, 1]
         begin = np.append(-half, y + 0.5 * self.aperture_width_m)
         end = np.append(y - 0.5 * self.aperture_width_m, half)
         edges = [[self.barrier_thickness_m, width, self.length_m] for width in end - begin]

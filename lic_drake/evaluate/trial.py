@@ -14,7 +14,6 @@ from uuid import uuid4
 import numpy as np
 
 from lic_drake.evaluate.trials import TrialRow, read_trials, write_trials
-from lic_drake.experience.pairs import pair_second_attempts
 from lic_drake.experience.runner import Task, refuse_failed, run_tasks, shard_name
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.experience.workers import Workers
@@ -56,18 +55,17 @@ def run_trial(
     p_WG: Vector,
     attempts: int,
     *,
-    fresh: bool = False,
     moves: bool = True,
     reach: Callable[[ReachRequest], ReachRecord] = run_reach,
     look: Callable[[int], tuple[Vector, FeasibleStarts]] | None = None,
 ) -> list[Attempt]:
     """Selects and reaches until the goal is reached or the attempts are used up.
 
-    The goal p_WG has the shape (3,), metres. Unless `fresh`, an attempt finds the environment as
-    the previous one left it, as on a real robot. `moves` says whether a PR2 may move base and torso
-    before a reach, and `reach` simulates a request. `look` returns the perceived goal and the
-    starts believed feasible before the attempt with a number, from 0; both are known by default. If
-    the perceived goal has changed, the environment is reset.
+    The goal p_WG has the shape (3,), metres. An attempt finds the environment as the previous one
+    left it, as on a real robot. `moves` says whether a PR2 may move base and torso before a reach,
+    and `reach` simulates a request. `look` returns the perceived goal and the starts believed
+    feasible before the attempt with a number, from 0; both are known by default. If the perceived
+    goal has changed, the environment is reset.
     """
     if look is None:
         known = make_starts(scenario, scenario.sample_instance(stream, environment), moves)
@@ -80,7 +78,7 @@ def run_trial(
         p_seen, starts = look(number)
         failed = tuple(FailedReach.from_record(attempt.record) for attempt in done)
         selection = selector.select(Situation(p_WG=p_seen, starts=starts, failed=failed))
-        if done and not fresh and np.array_equal(p_seen, done[-1].request.goal):
+        if done and np.array_equal(p_seen, done[-1].request.goal):
             request = done[-1].request.then(selection.start)
         else:
             request = ReachRequest(scenario, stream, environment, p_seen, selection.start)
@@ -114,17 +112,14 @@ def random_requests(
 class Evaluation:
     """The parameters of an evaluation; plain data that can be pickled.
 
-    Environments and goals are drawn from a seed stream; `common_goals` are those of environment 0.
-    With `fresh`, the environment is reset before later attempts; `moves` says whether a PR2 may
-    move base and torso. With cameras, a reach succeeds if it ends in the ball.
+    Environments and goals are drawn from a seed stream; `moves` says whether a PR2 may move base
+    and torso. With cameras, a reach succeeds if it ends in the ball.
 
     Attributes:
         experience: Library that the strategies learn from; its scenario is the default.
         results: Folder for `trials.parquet` and the library `reaches`.
         methods: Strategies, see `lic_drake.select.registry.check_method`.
         variant: Name of these trials among others in the same folder.
-        second_attempts: Library of real second attempts for LIC-2; None: D2 is composed of single
-            reaches, as in the paper.
         overrides: YAML text merged into the scenario, for instance to block apertures.
         scenario_name: Name or path of a scenario other than the library's.
         cameras: Name or path of those that perceive apertures and goal; empty: both are known.
@@ -137,10 +132,7 @@ class Evaluation:
     goals: int
     attempts: int = 2
     stream: str = "evaluation"
-    fresh: bool = False
     variant: str = ""
-    common_goals: bool = False
-    second_attempts: Path | None = None
     overrides: str = ""
     moves: bool = True
     scenario_name: str = ""
@@ -184,7 +176,6 @@ def run_evaluation(
     elsewhere = replace(  # Workers may run in other folders.
         evaluation,
         experience=evaluation.experience.absolute(),
-        second_attempts=evaluation.second_attempts and evaluation.second_attempts.absolute(),
     )
     cameras = load_cameras(evaluation.cameras) if evaluation.cameras else None
     shared = (uuid4().hex, elsewhere, scenario, cameras)
@@ -229,15 +220,11 @@ class _Strategies:
     """The strategies of an evaluation, each fitted on first use."""
 
     def __init__(self, evaluation: Evaluation, scenario: Scenario) -> None:
-        pairs = None
-        if evaluation.second_attempts is not None:
-            attempts = ExperienceLibrary(evaluation.second_attempts)
-            pairs = pair_second_attempts(attempts.columns())
         self._stream = evaluation.stream
         arm, category = scenario.arm(), scenario.category
         columns = ExperienceLibrary(evaluation.experience).columns()
         self._fitted: Callable[[str], Selector] = cache(
-            partial(make_selector, arm=arm, columns=columns, category=category, pairs=pairs)
+            partial(make_selector, arm=arm, columns=columns, category=category)
         )
 
     def selector(self, method: str, environment: int, goal: int) -> Selector:
@@ -280,8 +267,7 @@ def _try_environment(
 
     rows: list[TrialRow] = []
     for goal in range(evaluation.goals):
-        at = 0 if evaluation.common_goals else environment
-        p_WG = scenario.sample_goal(evaluation.stream, at, goal)
+        p_WG = scenario.sample_goal(evaluation.stream, environment, goal)
         place: dict[str, Any] = {
             "scenario": scenario,
             "stream": evaluation.stream,
@@ -295,7 +281,6 @@ def _try_environment(
             attempts = run_trial(
                 selector=_strategies[name].selector(method, environment, goal),
                 attempts=evaluation.attempts,
-                fresh=evaluation.fresh,
                 reach=reach,
                 look=observer,
                 **place,

@@ -1,4 +1,4 @@
-"""The library D2 of second reaches (paper III-C), built from single or actual second reaches."""
+"""The library D2 of second reaches (paper III-C), built from single reaches."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lic_drake.errors import LibraryError
-from lic_drake.reach.start import IN_PLANE, IN_SPACE, POSE_AXES
 
 SHOWN = (
     *("start_x", "start_y", "start_phi", "final_x", "final_y", "final_phi", "final_vx", "final_vy"),
@@ -51,41 +50,6 @@ def pair_reaches(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]
     repeats = num_members[task[failed]]
     first = np.repeat(failed, repeats)
     rank = np.arange(len(first)) - np.repeat(np.cumsum(repeats) - repeats, repeats)
-    return _joined(columns, first, members[offset[task[first]] + rank])
-
-
-def pair_second_attempts(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Returns D2 from actual second attempts: the paper's "straightforward approach".
-
-    Takes the columns of a library of first and second attempts, whose `after` has one reach.
-    Returns them as `pair_reaches`, in the library's order.
-    """
-    in_space = np.any(columns.get("start_qw", np.zeros(1)) != 0.0)
-    # What each earlier reach in a record's `after` consists of: start pose and base.
-    start = [f"start_{axis}" for axis in POSE_AXES[IN_SPACE if in_space else IN_PLANE]]
-    start += ["base_x", "base_y", *(["torso"] if in_space else [])]
-    lengths = np.array([len(after) for after in columns["after"]], dtype=int)
-    second = np.flatnonzero(lengths == len(start))
-    if len(second) == 0:
-        raise LibraryError("the library holds no second attempts; use one that does")
-    first_of = {
-        (*(columns[n][i] for n in _SAME_TASK), *(float(columns[n][i]) for n in start)): i
-        for i in np.flatnonzero(lengths == 0)
-    }
-    try:
-        first = [
-            first_of[(*(columns[n][i] for n in _SAME_TASK), *map(float, columns["after"][i]))]
-            for i in second
-        ]
-    except KeyError:
-        raise LibraryError(
-            "the library lacks the first attempt of a second one; collect both into one library"
-        ) from None
-    return _joined(columns, np.array(first), second)
-
-
-def _joined(
-    columns: Mapping[str, NDArray[Any]], first: NDArray[np.intp], second: NDArray[np.intp]
-) -> dict[str, NDArray[Any]]:
+    second = members[offset[task[first]] + rank]
     pairs = {name: values[second] for name, values in columns.items()}
     return pairs | {FIRST_PREFIX + name: columns[name][first] for name in SHOWN}

@@ -76,7 +76,6 @@ def make_selector(
     columns: Columns | None = None,
     rng: np.random.Generator | None = None,
     category: str = "cylinder-clutter",
-    pairs: Columns | None = None,
 ) -> Selector:
     """Returns a strategy, fitted to a library if it learns from one.
 
@@ -86,15 +85,13 @@ def make_selector(
         columns: Columns of the experience library, if it learns from one.
         rng: Source of draws for RND; by default always the same ones.
         category: Clutter category, which says what LIC observes.
-        pairs: Columns of D2 for LIC-2; by default made from `columns`, as in the paper.
 
     Raises:
-        RequestError: The strategy is unknown or has no library to learn from, or there are pairs
-            and no LIC-2.
+        RequestError: The strategy is unknown or has no library to learn from.
     """
     parts = check_method(method)
     if len(parts) > 1:
-        first, later = (make_selector(part, arm, columns, rng, category, pairs) for part in parts)
+        first, later = (make_selector(part, arm, columns, rng, category) for part in parts)
         return FallbackSelector(first=first, later=later, method=method)
     if not needs_library(method):
         rng = np.random.default_rng(0) if rng is None else rng
@@ -102,14 +99,10 @@ def make_selector(
     if columns is None:
         raise RequestError(f"method {method!r} needs an experience library to learn from")
     features, estimator, second = features_of(category), method, None
-    if features.second is None and pairs is not None:
-        raise RequestError(
-            f"{category} has no LIC-2 that could learn from second attempts; leave them out"
-        )
     if method not in estimator_names():
         estimator = method[:-1]
     elif features.second is not None:
-        second = fit_model(method, features.second, pairs or pair_reaches(columns))
+        second = fit_model(method, features.second, pair_reaches(columns))
     return LicSelector(fit_model(estimator, features.first, columns), second, method=method)
 
 

@@ -18,7 +18,6 @@ def main() -> None:
     parser.add_argument("scenario", help="name of a shipped scenario")
     parser.add_argument("--environments", type=int, default=40)
     parser.add_argument("--goals", type=int, default=1, help="random goals in each environment")
-    parser.add_argument("--common-goals", action="store_true", help="the same goals in all of them")
     parser.add_argument("--grid-goals", action="store_true", help="those of a collection instead")
     parser.add_argument("--stream", default="evaluation", help="seed stream of the environments")
     parser.add_argument("--set", default="", metavar="YAML", help="values put over the scenario")
@@ -31,9 +30,11 @@ def main() -> None:
     for environment in range(args.environments):
         instance = scenario.sample_instance(args.stream, environment)
         grid = (board_starts if args.still else make_starts)(scenario, instance).grid.without_q()
-        at = 0 if args.common_goals else environment
-        goals = [scenario.sample_goal(args.stream, at, goal) for goal in range(args.goals)]
-        for p_WG in scenario.goals(args.stream, environment) if args.grid_goals else goals:
+        if args.grid_goals:
+            goals = list(scenario.goals(args.stream, environment))
+        else:
+            goals = [scenario.sample_goal(args.stream, environment, g) for g in range(args.goals)]
+        for p_WG in goals:
             requests += [
                 ReachRequest(scenario, args.stream, environment, p_WG, start) for start in grid
             ]

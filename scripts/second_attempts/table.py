@@ -19,19 +19,12 @@ NAMES = {
 }
 """Second choices by what a method's name has after the estimator's."""
 
-VARIANTS = {
-    "": "as the first attempt left it",
-    "fresh": "a fresh copy",
-    "real-pairs": "as the first attempt left it; LIC-2 learned from real second attempts",
-}
-"""Environments that second attempts find, and how LIC-2 learned, by the trials' variant."""
-
 
 def second_attempts_table(trials: TrialTable, category: str, estimator: str) -> Table:
     """Returns success of second attempts after LIC-1 with an estimator failed.
 
-    All choices follow the same failures; McNemar's paired test compares each with LIC-2 as in the
-    paper in the environment as the first attempt left it.
+    All choices follow the same failures and find the environment as these left it; McNemar's
+    paired test compares each with LIC-2.
 
     Args:
         trials: Trials of two attempts.
@@ -39,21 +32,19 @@ def second_attempts_table(trials: TrialTable, category: str, estimator: str) -> 
         estimator: "gp" or "knn".
     """
     failed = ~trials.success(estimator, 1)
-    paper = trials.success(estimator, 2)[failed]
+    lic_2 = trials.success(estimator, 2)[failed]
     rows = []
-    for variant, environment in VARIANTS.items():
-        for suffix, name in NAMES.items():
-            # LIC-1 for all attempts has LIC-1's first one.
-            method = f"{estimator}{suffix}"
-            if method not in trials.methods(variant):
-                continue
-            won = trials.success(method, 2, variant)[failed]
-            p = "" if (variant, suffix) == ("", "") else f"{mcnemar(won, paper):.2g}"
-            rows.append((name, environment, *rate_cells(count(won)), p))
+    for suffix, name in NAMES.items():
+        # All of these methods have LIC-1's first attempt.
+        method = f"{estimator}{suffix}"
+        if method in trials.methods():
+            won = trials.success(method, 2)[failed]
+            p = f"{mcnemar(won, lic_2):.2g}" if suffix else ""
+            rows.append((name, *rate_cells(count(won)), p))
     return Table(
         caption=f"Second attempts in {category} after failures of LIC-1 ({estimator}).",
         heading=(
-            *("second choice", "environment", "success, %", "Wilson 90 % interval", "count"),
+            *("second choice", "success, %", "Wilson 90 % interval", "count"),
             "McNemar's p against LIC-2",
         ),
         rows=tuple(rows),

@@ -106,19 +106,6 @@ def test_rows_agree_with_the_library_of_reaches(evaluation: Evaluate, calls: lis
             assert request.before() == (chain[number - 1] if number else None)
 
 
-def test_fresh_attempts_find_a_reset_environment_and_environments_may_share_goals(
-    evaluation: Evaluate, calls: list[str]
-) -> None:
-    asked = evaluation(fresh=True, variant="fresh", common_goals=True)
-    rows = run_evaluation(asked, say=quiet)
-    assert any(row.attempt == 2 for row in rows)
-    assert {row.variant for row in rows} == {"fresh"}
-    records, scenario = asked.reaches.records(), asked.reaches.scenario()
-    assert all(record.after == () for record in records)
-    expected = {tuple(scenario.sample_goal("evaluation", 0, goal)) for goal in (0, 1)}
-    assert {tuple(record.p_WG) for record in records} == expected
-
-
 def test_a_second_run_simulates_nothing_and_a_larger_one_only_what_is_new(
     evaluation: Evaluate, calls: list[str]
 ) -> None:
@@ -170,11 +157,11 @@ def test_the_file_keeps_trials_of_other_variants_and_strategies(
 ) -> None:
     plain = evaluation()
     rows = run_evaluation(plain, say=quiet)
-    fresh = run_evaluation(replace(plain, fresh=True, variant="fresh"), say=quiet)
+    other = run_evaluation(replace(plain, attempts=1, variant="other"), say=quiet)
     more = run_evaluation(replace(plain, methods=("rnd>cost",)), say=quiet)
     # Fewer environments: replaces the trials of the same variant and method.
     fewer = run_evaluation(replace(plain, methods=("rnd",), environments=1), say=quiet)
-    expected = [*(row for row in rows if row.method == "cost"), *fresh, *more, *fewer]
+    expected = [*(row for row in rows if row.method == "cost"), *other, *more, *fewer]
     stored = read_trials(tmp_path / "out" / "trials.parquet")
     assert sorted(without_times(stored)) == sorted(without_times(expected))
 

@@ -11,7 +11,7 @@ from support.trial_rows import make_rows
 from lic_drake.errors import LibraryError
 from lic_drake.evaluate.trials import SCHEMA, TrialRow, TrialTable, read_trials, write_trials
 
-ROWS = make_rows("rnd", ["1", "01", "00"]) + make_rows("gp", ["01", "1", "1"], variant="fresh")
+ROWS = make_rows("rnd", ["1", "01", "00"]) + make_rows("gp", ["01", "1", "1"], variant="other")
 
 
 def bits(row: TrialRow) -> list[object]:
@@ -69,10 +69,10 @@ def test_trials_are_sorted_runs_of_attempts() -> None:
 
 def test_variants_are_kept_apart() -> None:
     table = TrialTable(ROWS)
-    assert table.variants == ("", "fresh")
-    assert (table.methods(), table.methods("fresh")) == (("rnd",), ("gp",))
-    assert table.success("gp", 1, "fresh").tolist() == [False, True, True]
-    assert table.conditional("gp", 2, "fresh") == (1, 1)
+    assert table.variants == ("", "other")
+    assert (table.methods(), table.methods("other")) == (("rnd",), ("gp",))
+    assert table.success("gp", 1, "other").tolist() == [False, True, True]
+    assert table.conditional("gp", 2, "other") == (1, 1)
 
 
 def test_trials_that_cannot_be_compared_are_refused() -> None:

@@ -17,7 +17,6 @@ SHOWN = {
     "own_estimator": "the forest chooses",
     "own_constraint": "bound: b0",
     "own_category": "reached",
-    "unknown_category": "first choice",
 }
 
 PARTS = {"cylinder-clutter": 1, "passage-clutter": 12}

@@ -91,14 +91,13 @@ def test_second_choices_are_counted_on_the_failures_of_lic_1() -> None:
         [
             *make_rows("gp", ["1", "01", "01", "01", "00", "00"]),
             *make_rows("gp>cost", ["1", "00", "00", "01", "01", "00"]),
-            *make_rows("gp", ["1", "01", "01", "01", "01", "00"], variant="fresh"),
         ]
     )
     rows = second_attempts_table(trials, "cylinder-clutter", "gp").rows
-    assert [row[0] for row in rows] == ["LIC-2", "COST away from the first", "LIC-2"]
-    assert [row[4] for row in rows] == ["3/5", "2/5", "4/5"]
+    assert [row[0] for row in rows] == ["LIC-2", "COST away from the first"]
+    assert [row[3] for row in rows] == ["3/5", "2/5"]
     won = [trials.success(m, 2)[1:] for m in ("gp>cost", "gp")]
-    assert float(rows[1][5]) == pytest.approx(mcnemar(*won), rel=0.05)
+    assert float(rows[1][4]) == pytest.approx(mcnemar(*won), rel=0.05)
 
 
 def small_records(results: Path, category: str) -> Path:
