@@ -1,13 +1,12 @@
 """Success rates attained by choosing among starts, given reaches from every start to every goal.
 
-Arrays have the shape (E, G, S): E environments, G goals in each, S starts at each goal. All rates
-are given by environment, shape (E,), because reaches in one environment are correlated.
+Outcomes and scores have the shape (E, G, S): E environments, G goals in each, S starts at each
+goal. Rates are given by environment and goal, shape (E, G).
 """
 
 from itertools import combinations
 
 import numpy as np
-from scipy.special import comb
 
 from lic_drake.types import BoolVector, Vector
 
@@ -16,29 +15,40 @@ BANDWIDTHS_M = tuple(float(h) for h in np.geomspace(0.002, 0.4, 24))
 
 
 def random_rate(success: BoolVector, tried: BoolVector, attempts: int = 1) -> Vector:
-    """Returns the expected success of RND within some attempts from different starts.
+    """Returns the expected success of RND within some attempts, if each finds a fresh environment.
 
-    Each attempt finds a fresh copy of the environment: all fail with probability C(f, k) / C(n, k),
-    where f of the n starts fail.
+    All k attempts fail with probability (f / n)^k, where f of the n starts fail.
 
     Args:
         success: Outcomes, shape (E, G, S).
         tried: Which starts exist, shape (E, G, S).
         attempts: Number of attempts k.
     """
-    failures = comb((tried & ~success).sum(axis=2), attempts)
-    return np.asarray(1.0 - failures / comb(tried.sum(axis=2), attempts)).mean(axis=1)
-
-
-def oracle_rate(success: BoolVector) -> Vector:
-    """Returns the share of goals that some start reaches."""
-    return np.asarray(success.any(axis=2).mean(axis=1))
+    failing = (tried & ~success).sum(axis=2) / tried.sum(axis=2)
+    return np.asarray(1.0 - failing**attempts)
 
 
 def chosen_rate(success: BoolVector, score: Vector) -> Vector:
     """Returns the success rate of the best-scored starts; those of equal score share it."""
     best = score == score.max(axis=2, keepdims=True)
-    return np.asarray(((success & best).sum(axis=2) / best.sum(axis=2)).mean(axis=1))
+    return np.asarray((success & best).sum(axis=2) / best.sum(axis=2))
+
+
+def area_weights(goals: Vector) -> Vector:
+    """Returns weights of goals, shape (G,), whose sum is 1, for a mean over the goal area.
+
+    On a grid, which all environments share, they are those of the trapezoidal rule: a goal on an
+    edge stands for half a cell, in a corner for a quarter. Random goals count alike.
+
+    Args:
+        goals: Goals, shape (E, G, 2), metres.
+    """
+    weight = np.ones(goals.shape[1])
+    if np.all(goals == goals[0]):
+        for values in goals[0].T:
+            if np.ptp(values) > 0.0:
+                weight[(values == values.min()) | (values == values.max())] *= 0.5
+    return weight / weight.sum()
 
 
 def pairs_of_starts(success: BoolVector) -> BoolVector:

@@ -38,7 +38,8 @@ def main() -> None:
             requests += [
                 ReachRequest(scenario, args.stream, environment, p_WG, start) for start in grid
             ]
-    folder = args.results / "bounds" / args.scenario / "factorial"
+    goals_folder = "grid" if args.grid_goals else "random"
+    folder = args.results / "bounds" / args.scenario / goals_folder
     records = keep_reaches(requests, folder, args.workers)
     won = sum(record.success for record in records)
     print(f"{won} of {len(requests)} reaches at the goal; kept in {folder}")

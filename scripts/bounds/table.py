@@ -12,7 +12,6 @@ LIC's stands in for the population optimum.
 Strategies choose among the same discrete starts, so their success is read from the same reaches.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,7 +24,7 @@ from lic_drake.errors import LibraryError
 from lic_drake.estimate.features import features_of
 from lic_drake.evaluate.paper import TABLES, label
 from lic_drake.evaluate.table import Table
-from lic_drake.evaluate.trials import TrialTable, read_trials
+from lic_drake.evaluate.trials import TrialTable
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 from lic_drake.robots.registry import get_robot
@@ -34,16 +33,16 @@ from lic_drake.select.baselines import Hand, corridor_cost
 from lic_drake.select.registry import fit_model
 from lic_drake.types import BoolVector, IntVector, Vector
 from scripts.bounds.optima import (
+    area_weights,
     choose_bandwidth,
     chosen_rate,
     held_out_score,
     in_sample_score,
     one_start_score,
-    oracle_rate,
     pairs_of_starts,
     random_rate,
 )
-from scripts.common import run_tables, write_tables
+from scripts.common import load_trials, run_tables, write_tables
 
 Columns = Mapping[str, NDArray[Any]]
 
@@ -76,17 +75,34 @@ class Bound:
         """Mean over the environments."""
         return float(self.by_environment.mean())
 
-    def interval(self, confidence: float = 0.9) -> tuple[float, float]:
-        """Returns the bootstrap interval of the rate, by resampling environments.
+    def interval(self) -> tuple[float, float]:
+        """Returns the 90 % interval of the rate."""
+        return interval(_resampled_means(self.by_environment))
 
-        Environments are drawn, not reaches, because reaches in one environment are correlated.
-        The choices of starts and bandwidth stay fixed.
-        """
-        rng = make_generator("holdout", "bootstrap")
-        n = len(self.by_environment)
-        means = self.by_environment[rng.integers(n, size=(RESAMPLES, n))].mean(axis=1)
-        low, high = np.quantile(means, [0.5 - 0.5 * confidence, 0.5 + 0.5 * confidence])
-        return float(low), float(high)
+    def share_of(self, other: "Bound") -> str:
+        """Returns this rate in per cent of another one in the same environments, with interval."""
+        ours, theirs = (_resampled_means(b.by_environment) for b in (self, other))
+        if not theirs.all():
+            return ""
+        low, high = interval(ours / theirs)
+        return f"{100 * self.rate / other.rate:.0f} ({100 * low:.0f}..{100 * high:.0f})"
+
+
+def _resampled_means(by_environment: Vector) -> Vector:
+    """Returns means over environments drawn anew, the same draws in every call, shape (RESAMPLES,).
+
+    Environments are drawn, not reaches, because reaches in one environment are correlated. The
+    choices of starts and bandwidth stay fixed.
+    """
+    n = len(by_environment)
+    drawn = make_generator("holdout", "bootstrap").integers(n, size=(RESAMPLES, n))
+    return np.asarray(by_environment[drawn].mean(axis=1))
+
+
+def interval(samples: Vector) -> tuple[float, float]:
+    """Returns the central 90 % of a sample."""
+    low, high = np.quantile(samples, [0.05, 0.95])
+    return float(low), float(high)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,6 +128,11 @@ class Factorial:
         arranged = np.full(self.success.shape, -np.inf)
         arranged[self.index] = values
         return arranged
+
+    def bound(self, name: str, attempts: int, by_goal: Vector) -> Bound:
+        """Returns a rate given by environment and goal, shape (E, G), as a mean over the goals."""
+        by_environment = by_goal @ area_weights(self.goals)
+        return Bound(name=name, attempts=attempts, by_environment=by_environment)
 
 
 def load_factorial(columns: Columns) -> Factorial:
@@ -160,47 +181,42 @@ def compute_bounds(factorial: Factorial) -> list[Bound]:
     Two attempts find fresh copies of the environment here. The best pair of starts is what they
     attain without learning from the first one's failure.
     """
-    success, tried, goals = factorial.success, factorial.tried, factorial.goals
+    success, goals = factorial.success, factorial.goals
     bandwidth = choose_bandwidth(success, goals)
     one_start = chosen_rate(success, one_start_score(success))
-    bounds = [
-        Bound(name="RND", attempts=1, by_environment=random_rate(success, tried)),
-        Bound(name="one start for all goals, held out", attempts=1, by_environment=one_start),
-    ]
+    bounds = [factorial.bound("one start for all goals, held out", 1, one_start)]
     for outcomes, attempts, what in ((success, 1, "start"), (pairs_of_starts(success), 2, "pair")):
-        if attempts == 2:
-            rate = random_rate(success, tried, 2)
-            bounds.append(Bound(name="RND", attempts=2, by_environment=rate))
         scores = {"held out": held_out_score(outcomes, goals, bandwidth)}
         if np.all(goals == goals[0]):
             scores["in sample"] = in_sample_score(outcomes)
         bounds += [
-            Bound(
-                name=f"best {what} for each goal, {how}",
-                attempts=attempts,
-                by_environment=chosen_rate(outcomes, score),
+            factorial.bound(
+                f"best {what} for each goal, {how}", attempts, chosen_rate(outcomes, score)
             )
             for how, score in scores.items()
         ]
-        bounds.append(Bound(name="oracle", attempts=attempts, by_environment=oracle_rate(success)))
-    return bounds
+    return [*_extremes(factorial), *bounds]
 
 
 def aperture_bounds(factorial: Factorial, results: Path) -> list[Bound]:
     """Returns the same where every environment has its own starts."""
-    success, tried = factorial.success, factorial.tried
     reference = factorial.arrange(_experienced_estimates(factorial.columns, results))
-    oracle = oracle_rate(success)
+    best = chosen_rate(factorial.success, reference)
+    name = "best start by more experience, held out"
+    return [*_extremes(factorial), factorial.bound(name, 1, best)]
+
+
+def _extremes(factorial: Factorial) -> list[Bound]:
+    """Returns what a random start and any start attain."""
+    success, tried = factorial.success, factorial.tried
+    oracle = success.any(axis=2).astype(float)
     return [
-        Bound(name="RND", attempts=1, by_environment=random_rate(success, tried)),
-        Bound(
-            name="best start by more experience, held out",
-            attempts=1,
-            by_environment=chosen_rate(success, reference),
-        ),
-        Bound(name="oracle", attempts=1, by_environment=oracle),
-        Bound(name="RND", attempts=2, by_environment=random_rate(success, tried, 2)),
-        Bound(name="oracle", attempts=2, by_environment=oracle),
+        bound
+        for k in (1, 2)
+        for bound in (
+            factorial.bound("RND", k, random_rate(success, tried, k)),
+            factorial.bound("oracle", k, oracle),
+        )
     ]
 
 
@@ -232,17 +248,21 @@ def cost_score(columns: Columns) -> Vector:
     return np.asarray(-np.round(cost, 9) - 1e-10 * aside)
 
 
-def category_table(results: Path, category: str) -> Table:
+def category_table(results: Path, category: str, goals: str) -> Table:
     """Returns the bounds of a category and what the strategies attain, in rising order.
 
     Args:
-        results: Folder of all records; `bounds/<category>/factorial` holds reaches from all
-            discrete starts, see run.py, and `bounds/<category>/trials.parquet`, if it is there,
-            both attempts of strategies at the same goals.
+        results: Folder of all records; `bounds/<category>/<goals>` holds reaches from all discrete
+            starts, see run.py.
         category: Clutter category.
+        goals: "random" for the evaluation's goals, where both attempts of strategies are read from
+            its trials, or "grid".
+
+    Raises:
+        LibraryError: RND's first attempt differs from the evaluation's by more than chance, so that
+            the bounds would not be those of the evaluation.
     """
-    folder = results / "bounds" / category
-    factorial = load_factorial(ExperienceLibrary(folder / "factorial").columns())
+    factorial = load_factorial(ExperienceLibrary(results / "bounds" / category / goals).columns())
     columns = factorial.columns
     library = ExperienceLibrary(shipped_library(category)).columns()
     scores = {"cost": cost_score(columns)}
@@ -250,95 +270,93 @@ def category_table(results: Path, category: str) -> Table:
     bounds = (
         aperture_bounds(factorial, results) if category == APERTURES else compute_bounds(factorial)
     )
-    learned: dict[str, dict[int, float]] = {}
-    for name, score in scores.items():
-        rate = chosen_rate(factorial.success, factorial.arrange(score))
-        learned[label(name)] = {1: float(rate.mean())}
-        bounds.append(
-            Bound(name=f"{label(name)}, discrete starts", attempts=1, by_environment=rate)
+    strategies = {
+        (label(name), 1): factorial.bound(
+            f"{label(name)}, discrete starts",
+            1,
+            chosen_rate(factorial.success, factorial.arrange(score)),
         )
-    for name, rate in _both_attempts(folder / "trials.parquet").items():
-        learned[label(name)][2] = float(rate.mean())
-        bounds.append(
-            Bound(name=f"{label(name)}, LIC-1 and LIC-2", attempts=2, by_environment=rate)
+        for name, score in scores.items()
+    }
+    trials = load_trials(results, category)
+    rnd = next(b for b in bounds if (b.name, b.attempts) == ("RND", 1))
+    evaluated = float(trials.success("rnd", 1).mean())
+    low, high = rnd.interval()
+    if not low <= evaluated <= high:
+        raise LibraryError(
+            f"RND succeeds in {100 * low:.1f}..{100 * high:.1f} % of the reaches in"
+            f" bounds/{category}/{goals}, in {100 * evaluated:.1f} % of the evaluation: try more"
+            " environments, or its goals"
         )
-    return bounds_table(
-        sorted(bounds, key=lambda bound: (bound.attempts, bound.rate)), category, learned
-    )
+    if goals == "random":
+        shape = factorial.success.shape[:2]
+        strategies |= {
+            (label(name), 2): factorial.bound(
+                f"{label(name)}, both attempts", 2, _both_attempts(trials, name, shape)
+            )
+            for name in scores
+        }
+    return bounds_table(bounds, strategies, f"{category}, {goals} goals")
 
 
-def _both_attempts(path: Path) -> dict[str, Vector]:
-    """Returns the success rate of two attempts in each environment, shape (E,), by estimator."""
-    if not path.exists():
-        return {}
-    table = TrialTable(read_trials(path))
-    environments = np.array([environment for environment, _ in table.pairs()])
-    rates = {}
-    for name in [name for name in LEARNED if name in table.methods()]:
-        won = table.success(name, 2)
-        rates[name] = np.array([won[environments == e].mean() for e in np.unique(environments)])
-    return rates
+def _both_attempts(trials: TrialTable, method: str, shape: tuple[int, ...]) -> Vector:
+    """Returns the success of two attempts by environment and goal, shape (E, G)."""
+    environment, goal = np.array(trials.pairs()).T
+    here = (environment < shape[0]) & (goal < shape[1])
+    return np.asarray(trials.success(method, 2)[here].reshape(shape).astype(float))
 
 
 def bounds_table(
-    bounds: Sequence[Bound], category: str, learned: Mapping[str, Mapping[int, float]]
+    bounds: Sequence[Bound], strategies: Mapping[tuple[str, int], Bound], what: str
 ) -> Table:
-    """Returns the bounds with the share of the gap from RND to each that strategies close.
+    """Returns bounds and strategies in rising order, and which share of each a strategy attains.
 
     Args:
-        bounds: With RND's rates among them.
-        category: Clutter category.
-        learned: Success rates of strategies on the bounds' goals, by name and number of attempts.
+        bounds: What could be attained.
+        strategies: What strategies attain, by their names and numbers of attempts.
+        what: Category and goals.
     """
-    rnd = {bound.attempts: bound.rate for bound in bounds if bound.name == "RND"}
-    rows = []
-    for bound in bounds:
+    names = list(dict.fromkeys(name for name, _ in strategies))
+    everything = sorted([*bounds, *strategies.values()], key=lambda b: (b.attempts, b.rate))
+    rows: list[tuple[str, ...] | None] = []
+    for bound in everything:
+        if rows and bound.attempts == 2 and rows[-1] is not None and rows[-1][0] == "1":
+            rows.append(None)
         low, high = bound.interval()
-        shares = []
-        for rates in learned.values():
-            share = math.nan
-            if bound.attempts in rates:
-                share = share_of_gap(rnd[bound.attempts], rates[bound.attempts], bound.rate)
-            shares.append("" if math.isnan(share) else f"{100.0 * share:.0f}")
+        attained = (strategies.get((name, bound.attempts)) for name in names)
         rows.append(
             (
                 str(bound.attempts),
                 bound.name,
                 f"{100.0 * bound.rate:.1f}",
                 f"{100.0 * low:.1f}..{100.0 * high:.1f}",
-                *shares,
+                *("" if strategy is None else strategy.share_of(bound) for strategy in attained),
             )
         )
     n = len(bounds[0].by_environment)
     return Table(
-        caption=f"Bounds in {category}, from every start at every goal in {n} environments."
-        " Intervals are 90 %, from environments drawn anew.",
+        caption=f"Bounds in {what}: from every start at every goal in {n} environments. Intervals"
+        " are 90 %, from environments drawn anew.",
         heading=(
             "attempts",
             "choice",
             "success, %",
             "90 % interval",
-            *(f"gap closed by {name}, %" for name in learned),
+            *(f"of it by {name}, %" for name in names),
         ),
         rows=tuple(rows),
     )
 
 
-def share_of_gap(rnd: float, lic: float, bound: float) -> float:
-    """Returns what share of the way from RND's success rate to a bound LIC goes; NaN without one.
-
-    Args:
-        rnd: Success rate of RND.
-        lic: Success rate of LIC on the same goals.
-        bound: The bound there.
-    """
-    return (lic - rnd) / (bound - rnd) if bound > rnd else math.nan
-
-
 def write(results: Path) -> list[Path]:
-    """Writes a table of bounds for each category whose bounds were measured."""
-    measured = [c for c in TABLES if (results / "bounds" / c / "factorial").exists()]
-    return write_tables(results, "bounds", [category_table(results, c) for c in measured])
+    """Writes the bounds that were measured."""
+    tables = [
+        category_table(results, category, goals)
+        for category in TABLES
+        for goals in ("random", "grid")
+        if (results / "bounds" / category / goals).exists()
+    ]
+    return write_tables(results, "bounds", tables)
 
 
 if __name__ == "__main__":

@@ -9,10 +9,10 @@ import lic_drake as lic
 library = lic.ExperienceLibrary(lic.shipped_library("passage-clutter"))
 scenario = library.scenario()
 selector = lic.make_selector("gp", scenario.arm(), library.columns(), category=scenario.category)
-p_WG = scenario.sample_goal("evaluation", 4)
-trial = lic.run_trial(scenario, selector, "evaluation", 4, p_WG, attempts=2)
+p_WG = scenario.sample_goal("evaluation", 24)
+trial = lic.run_trial(scenario, selector, "evaluation", 24, p_WG, attempts=2)
 
-recording = lic.Recording(scenario, scenario.sample_instance("evaluation", 4))
+recording = lic.Recording(scenario, scenario.sample_instance("evaluation", 24))
 for attempt in trial:
     start, estimate = attempt.selection.start, attempt.selection.probability
     print(f"x0 {np.round(start.x0, 3)}, estimated {estimate:.2f}: {attempt.record.outcome}")

@@ -155,7 +155,7 @@ def write(results: Path) -> list[Path]:
     """Writes all tables."""
     tables = paper_tables(results)
     spheres = load_trials(results, "sphere-aperture-clutter")
-    every = ExperienceLibrary(results / "bounds" / "sphere-aperture-clutter" / "factorial")
+    every = ExperienceLibrary(results / "bounds" / "sphere-aperture-clutter" / "random")
     tables["table_pr2"] = [pr2_table(spheres), oracle_table(spheres, every)]
     tables["table_foliage"] = [foliage_table(load_trials(results, "foliage-aperture-clutter"))]
     return [p for name, parts in tables.items() for p in write_tables(results, name, parts)]

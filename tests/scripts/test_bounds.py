@@ -1,4 +1,4 @@
-from itertools import combinations
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -9,6 +9,7 @@ from hypothesis.extra.numpy import arrays
 
 from lic_drake.errors import LibraryError
 from scripts.bounds.optima import (
+    area_weights,
     choose_bandwidth,
     held_out_score,
     one_start_score,
@@ -58,9 +59,9 @@ def rates(bounds: list[Bound]) -> dict[tuple[str, int], float]:
 
 
 @given(small, st.integers(1, 2))
-def test_rnd_is_the_mean_over_all_sets_of_starts(success: np.ndarray, attempts: int) -> None:
-    sets = list(combinations(range(success.shape[2]), attempts))
-    expected = np.mean([success[:, :, list(s)].any(axis=2) for s in sets], axis=0).mean(axis=1)
+def test_rnd_is_the_mean_over_all_sequences_of_starts(success: np.ndarray, attempts: int) -> None:
+    sequences = list(product(range(success.shape[2]), repeat=attempts))
+    expected = np.mean([success[:, :, list(s)].any(axis=2) for s in sequences], axis=0)
     rate = random_rate(success, np.ones_like(success), attempts)
     np.testing.assert_allclose(rate, expected, atol=1e-12)
 
@@ -73,6 +74,16 @@ def test_the_bandwidth_goes_from_the_goal_itself_to_all_goals_alike(success: np.
         np.testing.assert_allclose(narrow[e], others.mean(axis=0), atol=1e-9)
         np.testing.assert_allclose(wide[e] - others.mean(axis=(0, 1)), 0.0, atol=1e-6)
     np.testing.assert_allclose(wide, one_start_score(success), atol=1e-6)
+
+
+def test_goals_of_a_grid_integrate_a_bilinear_function_over_the_goal_area() -> None:
+    x, y = (axis.ravel() for axis in np.meshgrid([0.4, 0.5, 0.6], [-0.2, 0.0, 0.2, 0.4]))
+    weight = area_weights(np.stack([np.column_stack([x, y])] * 2))
+    rates = 2.0 + 3.0 * x - y + 4.0 * x * y
+    # Its mean is its value in the middle of the area.
+    assert weight @ rates == pytest.approx(2.0 + 3.0 * 0.5 - 0.1 + 4.0 * 0.5 * 0.1)
+    scattered = np.random.default_rng(0).random((3, 5, 2))
+    np.testing.assert_allclose(area_weights(scattered), 0.2)
 
 
 @pytest.mark.parametrize(("width", "smallest", "largest"), [(0.02, 0.0, 0.03), (10.0, 0.1, 1.0)])
@@ -114,17 +125,25 @@ def test_where_each_goal_has_its_start_the_population_optimum_is_the_oracle() ->
             ("best start for each goal, held out", 1): 1.0,
             ("best start for each goal, in sample", 1): 1.0,
             ("oracle", 1): 1.0,
-            ("RND", 2): 0.5,
+            ("RND", 2): 1.0 - 0.75**2,
             ("best pair for each goal, held out", 2): 1.0,
             ("best pair for each goal, in sample", 2): 1.0,
             ("oracle", 2): 1.0,
         }
     )
-    table = bounds_table(bounds, "cylinder-clutter", {"LIC(GP)": {1: 0.7, 2: 0.8}, "K": {1: 0.4}})
-    found = {row[:2]: row[2:] for row in table.rows if row}
-    assert found["1", "RND"] == ("25.0", "25.0..25.0", "", "")
-    assert found["1", "best start for each goal, held out"] == ("100.0", "100.0..100.0", "60", "20")
-    assert found["2", "oracle"] == ("100.0", "100.0..100.0", "60", "")
+
+
+def test_the_table_says_which_share_of_each_bound_a_strategy_attains() -> None:
+    def bound(name: str, attempts: int, *rate: float) -> Bound:
+        return Bound(name=name, attempts=attempts, by_environment=np.array(rate))
+
+    bounds = [bound("RND", 1, 0.2, 0.2), bound("oracle", 1, 1.0, 0.5), bound("oracle", 2, 1.0, 1.0)]
+    gp = {("LIC(GP)", 1): bound("LIC(GP), discrete starts", 1, 0.8, 0.4)}
+    rows = [row for row in bounds_table(bounds, gp, "a category").rows if row]
+    assert [row[1] for row in rows] == ["RND", "LIC(GP), discrete starts", "oracle", "oracle"]
+    # Four fifths in each environment, hence in every sample of them.
+    assert rows[2] == ("1", "oracle", "75.0", "50.0..100.0", "80 (80..80)")
+    assert rows[3][4] == ""
 
 
 def test_where_the_environment_decides_only_the_oracle_gains() -> None:
