@@ -67,6 +67,7 @@ def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("lic_drake.show.density.DENSITY_SHAPE", (21, 23))
     small = CameraConfig(width=320, height=240, focal_px=275.0)
     monkeypatch.setattr("lic_drake.show.stills.CAMERA", small)
+    monkeypatch.setattr("lic_drake.show.film.CAMERA", small)
 
 
 @pytest.fixture

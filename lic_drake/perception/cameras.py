@@ -36,7 +36,7 @@ from lic_drake.errors import RenderingError
 from lic_drake.perception.config import CameraConfig, CamerasConfig
 from lic_drake.perception.image import CameraImage
 from lic_drake.robots.pr2 import HEAD_CAMERA, RIGHT_ARM_AT_REST, make_pr2
-from lic_drake.scene.scene import Scene, SceneConfig, add_scene
+from lic_drake.scene.scene import SceneConfig, add_scene
 from lic_drake.types import Vector
 
 RENDERER = "vtk"
@@ -75,9 +75,12 @@ class Views(NamedTuple):
 
 
 def take_views(instance: ClutterInstance, p_WG: Vector, cameras: CamerasConfig) -> Views:
-    """Returns exact images of an environment, before the robot reaches; see `add_cameras`."""
+    """Returns exact images of an environment, before the robot reaches.
+
+    A RenderingError says that there are no cameras here.
+    """
     builder = DiagramBuilder()
-    _, head, external = add_cameras(builder, instance, p_WG, cameras)
+    head, external = _add_cameras(builder, instance, p_WG, cameras)
     diagram = builder.Build()
     root = diagram.CreateDefaultContext()
     return Views(
@@ -85,22 +88,17 @@ def take_views(instance: ClutterInstance, p_WG: Vector, cameras: CamerasConfig) 
     )
 
 
-def add_cameras(
-    builder: DiagramBuilder,
-    instance: ClutterInstance,
-    p_WG: Vector,
-    cameras: CamerasConfig,
-    ahead: bool = False,
-) -> tuple[Scene, RgbdSensor, RgbdSensor]:
+def _add_cameras(
+    builder: DiagramBuilder, instance: ClutterInstance, p_WG: Vector, cameras: CamerasConfig
+) -> tuple[RgbdSensor, RgbdSensor]:
     """Adds an environment, a ball at the goal, a PR2 that observes it, and the cameras.
 
-    In the default context the robot stands where it looks from, its right arm at its side; it faces
-    along x if `ahead`, else as the head's configuration says. Returned are the scene, the sensor on
-    the head and the external one. Raises a RenderingError as `make_renderer` does.
+    In the default context the robot stands where it looks from, its right arm at its side. Returned
+    are the sensor on the head and the external one. Raises a RenderingError as `make_renderer`.
     """
     head, external = cameras.head, cameras.external
     x, y, heading = head.base_pose
-    robot = make_pr2(0.0 if ahead else heading, head.tilt_deg)
+    robot = make_pr2(heading, head.tilt_deg)
     robot.check_height(head.torso_m)
     scene = add_scene(builder, robot, instance, SceneConfig(), visuals=True, mobile=True)
     plant, scene_graph = scene.plant, scene.scene_graph
@@ -114,7 +112,6 @@ def add_cameras(
     X_WC = look_at(external.p_WC, external.target)
     X_PC = mount.GetFixedPoseInBodyFrame()
     return (
-        scene,
         add_camera(builder, scene_graph, "head", head.camera, X_PC, parent),
         add_camera(builder, scene_graph, "external", external.camera, X_WC),
     )

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from lic_drake.errors import RenderingError
 from lic_drake.evaluate.trial import Attempt
 from lic_drake.perception.observer import Observer
 from lic_drake.reach.trace import ReachTrace
@@ -16,12 +17,12 @@ from lic_drake.show.figures import ShownTrial, save_figure
 from lic_drake.show.film import film_frames, save_film
 from lic_drake.show.page import embed, make_page, picture
 from lic_drake.show.recording import Recording
-from lic_drake.show.stills import save_stills
+from lic_drake.show.stills import StillCamera, save_stills
 from lic_drake.show.views import SIDE, TOP, draw_view
 from lic_drake.starts import BoardStarts, LineStarts
 
 _OLD = (
-    *("density.png", "apertures.png", "look[1-9].png", "views.webp", "sequence.html"),
+    *("density.png", "apertures.png", "look[1-9].png", "film.webp", "sequence.html"),
     *(f"attempt[1-9]_{moment}.png" for moment in ("start", "middle", "end", "inside")),
 )
 
@@ -40,12 +41,13 @@ def save_pictures(
     say: Callable[[str], None] = print,
     drake_models: Path | None = None,
 ) -> dict[str, Path]:
-    """Writes demo.html, path.png and the stills of `lic_drake.show.stills.save_stills`.
+    """Writes demo.html, path.png, film.webp and `lic_drake.show.stills.save_stills`'s stills.
 
     In the plane also density.png, in front of a board apertures.png, and with cameras look1.png and
-    so on, views.webp (a film of both cameras) and sequence.html (all of it on one page). The
-    estimates are the selector's; `known` is what the robot observed, or the feasible starts if it
-    knows them. Returns the files by kind; a LicError says which cannot be written.
+    so on, and sequence.html (all of it on one page). The estimates are the selector's; `known` is
+    what the robot observed, or the feasible starts if it knows them. Returns the files by kind;
+    where nothing can be rendered, `say` receives a warning, and there are neither film nor stills.
+    A LicError says which file cannot be written.
     """
     attempts = trial.attempts
     recording = record_trial(trial, drake_models)
@@ -57,14 +59,12 @@ def save_pictures(
         save_figure(figure, files[kind])
 
     save("path", "path.png", path_figure(trial))
+    files |= save_rendered(trial, out, say, drake_models)
     if isinstance(known, Observer):
         save("apertures", "apertures.png", maps_figure(selector, known, attempts))
         for number in range(1, len(attempts) + 1):
             figure = look_figure(selector, known, attempts, number)
             save(f"look {number}", f"look{number}.png", figure)
-        if any(trace.states for trace in trial.traces):
-            files["views"] = out / "views.webp"
-            save_film(film_frames(trial, known.cameras), files["views"])
         files["sequence"] = out / "sequence.html"
         page = _sequence_page(known, attempts, files, recording)
         files["sequence"].write_text(page, encoding="utf-8")
@@ -72,7 +72,23 @@ def save_pictures(
         save("apertures", "apertures.png", apertures_figure(selector, known, attempts))
     else:
         save("density", "density.png", densities_figure(selector, known, attempts))
-    return files | save_stills(trial, out, say, drake_models)
+    return files
+
+
+def save_rendered(
+    trial: ShownTrial, out: Path, say: Callable[[str], None], drake_models: Path | None = None
+) -> dict[str, Path]:
+    """Writes stills and film, see `save_pictures`; returns the files by kind."""
+    try:
+        camera = StillCamera(trial.scenario, trial.instance, trial.p_WG, drake_models)
+    except RenderingError as error:
+        say(f"no stills and no film: {error}")
+        return {}
+    files = save_stills(trial, camera, out)
+    if files:
+        files["film"] = out / "film.webp"
+        save_film(film_frames(trial, drake_models), files["film"])
+    return files
 
 
 def record_trial(trial: ShownTrial, drake_models: Path | None = None) -> Recording:
@@ -115,9 +131,9 @@ def _sequence_page(
         " selects again. Arrows are contact forces.</p>",
         embed(recording.html(), height_px=540),
     ]
-    if "views" in files:
-        words = "The head camera and the external camera"
-        parts.append(picture(files["views"].read_bytes(), "image/webp", words))
+    if "film" in files:
+        words = "Both attempts, twice as fast, from the right and from behind the board"
+        parts.append(picture(files["film"].read_bytes(), "image/webp", words))
     for number, attempt in enumerate(attempts, start=1):
         words = f"Look {number}: open apertures, passable probabilities and goal. Attempt {number}:"
         words += f" {attempt.record.outcome}"

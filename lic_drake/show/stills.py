@@ -1,6 +1,5 @@
 """Rendered stills of attempts: start, moment of the largest contact force, and end."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple, cast
 
@@ -81,8 +80,13 @@ class StillCamera:
         instance: ClutterInstance,
         p_WG: Vector,
         drake_models: Path | None = None,
+        camera: CameraConfig | None = None,
     ) -> None:
-        """Builds the scene, see `lic_drake.show.stage.add_stage`; a RenderingError if it cannot."""
+        """Builds the scene for a camera, by default `CAMERA`; a RenderingError if it cannot.
+
+        For the environment see `lic_drake.show.stage.add_stage`.
+        """
+        self._config = camera or CAMERA
         builder = DiagramBuilder()
         self._scene = add_stage(builder, scenario, instance, drake_models)
         scene_graph = self._scene.scene_graph
@@ -99,7 +103,7 @@ class StillCamera:
         add_prop(scene_graph, "goal", Sphere(radius), p_WG, GOAL_COLOR)
         self.views = PLANAR_VIEWS if planar else SPATIAL_VIEWS
         self._sensors = {
-            name: add_camera(builder, scene_graph, f"{name}_camera", CAMERA, look_at(*view))
+            name: add_camera(builder, scene_graph, f"{name}_camera", self._config, look_at(*view))
             for name, view in self.views.items()
         }
         self._diagram = builder.Build()
@@ -111,8 +115,8 @@ class StillCamera:
         X_WC = look_at(*self.views[view])
         image = CameraImage(
             color=take_color_image(self._sensors[view], self._context),
-            depth=np.full((CAMERA.height, CAMERA.width), np.nan),
-            focal_px=CAMERA.focal_px,
+            depth=np.full((self._config.height, self._config.width), np.nan),
+            focal_px=self._config.focal_px,
             R_WC=np.array(X_WC.rotation().matrix()),
             p_WC=np.array(X_WC.translation()),
         )
@@ -129,24 +133,14 @@ class StillCamera:
         return np.reshape(p_WC, (-1, 3)), np.reshape(f_W, (-1, 3))
 
 
-def save_stills(
-    trial: ShownTrial,
-    out: Path,
-    say: Callable[[str], None],
-    drake_models: Path | None = None,
-) -> dict[str, Path]:
+def save_stills(trial: ShownTrial, camera: StillCamera, out: Path) -> dict[str, Path]:
     """Writes attempt1_start.png, attempt1_middle.png, attempt1_end.png and so on.
 
     For a robot in space attempt1_inside.png shows the end from behind the board. Returns the files
-    by kind; where stills cannot be rendered, `say` receives a warning and none are written.
+    by kind.
     """
-    try:
-        camera = StillCamera(trial.scenario, trial.instance, trial.p_WG, drake_models)
-    except RenderingError as error:
-        say(f"no stills: {error}")
-        return {}
     files = {}
-    for number, (attempt, trace) in enumerate(trial, start=1):
+    for number, (_, trace) in enumerate(trial, start=1):
         if not trace.states:
             continue
         last = len(trace.states) - 1
@@ -155,16 +149,25 @@ def save_stills(
         shots += [(view, view, last) for view in camera.views if view]
         for name, view, k in shots:
             still = camera.take(view, trace.b0, trace.states[k])
-            caption = f"attempt {number}, {trace.time_s[k]:.1f} s"
-            caption += f": {attempt.record.outcome}" if k == last else ""
             path = out / f"attempt{number}_{name}.png"
-            save_figure(draw_still(still, caption), path, margins=False)
+            save_figure(draw_still(still, still_caption(trial, number, k)), path, margins=False)
             files[f"attempt {number} {name}"] = path
     return files
 
 
-def draw_still(still: Still, caption: str) -> Figure:
-    """Returns a still with arrows for the forces on the arm, and a caption."""
+def still_caption(trial: ShownTrial, number: int, k: int) -> str:
+    """Returns the words for sample k of an attempt, counted from 1; at its end with the outcome."""
+    trace = trial.traces[number - 1]
+    caption = f"attempt {number}, {trace.time_s[k]:.1f} s"
+    at_end = k == len(trace.states) - 1
+    return f"{caption}: {trial.attempts[number - 1].record.outcome}" if at_end else caption
+
+
+def draw_still(still: Still, caption: str, scale: float = 1.0) -> Figure:
+    """Returns a still with arrows for the forces on the arm, and a caption if there is one.
+
+    `scale` multiplies the sizes of words and arrowheads.
+    """
     image = still.image
     height, width = image.shape
     figure = Figure(figsize=(0.005 * width, 0.005 * height))
@@ -175,13 +178,15 @@ def draw_still(still: Still, caption: str) -> Figure:
     arrows = still.f_W[shown] * (length / strength[shown])[:, np.newaxis]
     tails = image.project(still.p_WC[shown])
     heads = image.project(still.p_WC[shown] + arrows)
-    style = {"arrowstyle": "-|>", "color": "crimson", "lw": 1.8, "shrinkA": 0}
+    style = {"arrowstyle": "-|>", "color": "crimson", "shrinkA": 0}
+    style |= {"lw": 1.8 * scale, "mutation_scale": 10.0 * scale}
     for tail, head in zip(tails, heads, strict=True):
         ax.annotate("", xy=head, xytext=tail, annotation_clip=False, arrowprops=style)
-    if np.any(shown):
+    if caption and np.any(shown):
         caption += f"; forces on the arm up to {strength.max():.1f} N"
-    paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7}
-    ax.text(30, 45, caption, fontsize=9, color="0.15", bbox=paper)
+    if caption:
+        paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7}
+        ax.text(30, 45, caption, fontsize=9.0 * scale, color="0.15", bbox=paper)
     return figure
 
 

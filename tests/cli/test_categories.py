@@ -120,7 +120,7 @@ def test_select_takes_goals_that_a_base_aside_can_reach(
 def test_demo_shows_the_librarys_category(
     library: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("lic_drake.show.pictures.save_stills", lambda *args: {})
+    monkeypatch.setattr("lic_drake.show.pictures.save_rendered", lambda *args: {})
     out = tmp_path / "out"
     command = ["demo", "--method", "knn1", "--seed", "4", "--library", library, "--out", str(out)]
     assert main(command) == 0

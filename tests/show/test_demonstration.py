@@ -44,7 +44,7 @@ def spheres(tmp_path_factory: pytest.TempPathFactory) -> ExperienceLibrary:
 
 @pytest.fixture
 def _no_stills(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("lic_drake.show.pictures.save_stills", lambda *args: {})
+    monkeypatch.setattr("lic_drake.show.pictures.save_rendered", lambda *args: {})
 
 
 def messages_of(path: Path) -> bytes:
@@ -111,10 +111,10 @@ def test_a_pr2_shows_what_it_did_in_drakes_meshes(
     stills = [
         f"attempt {i} {name}" for i in (1, 2) for name in ("start", "middle", "end", "inside")
     ]
-    if not any("no stills: cameras cannot be simulated" in line for line in lines):
+    if not any("no stills and no film: cameras cannot be simulated" in line for line in lines):
         assert [kind for kind in result.files if kind.startswith("attempt")] == stills
     for kind, path in result.files.items():
-        assert kind in ("recording", "data") or path.read_bytes().startswith(PNG)
+        assert kind in ("recording", "data", "film") or path.read_bytes().startswith(PNG)
     assert {"apertures", "path"} < set(result.files)
     first, second = result.attempts
     assert first.record.scenario == scenario.digest
@@ -125,7 +125,7 @@ def test_a_pr2_shows_what_it_did_in_drakes_meshes(
     assert re.search(r"starts at the aperture at \(0.530,.*torso at", lines[1])
 
 
-@pytest.mark.usefixtures("_renderer", "_no_stills")
+@pytest.mark.usefixtures("_renderer", "_coarse")
 def test_before_foliage_the_robot_looks_before_every_attempt_and_shows_it(
     spheres: ExperienceLibrary, tmp_path: Path
 ) -> None:
@@ -143,7 +143,7 @@ def test_before_foliage_the_robot_looks_before_every_attempt_and_shows_it(
     page = result.files["sequence"].read_text(encoding="utf-8")
     for word in ("image/webp", "Look 1", "Look 2", "DecompressionStream"):
         assert word in page
-    assert {"look 1", "look 2", "views", "apertures", "recording"} <= set(result.files)
+    assert {"look 1", "look 2", "film", "apertures", "recording"} <= set(result.files)
     assert all(path.stat().st_size > 1000 for path in result.files.values())
 
 

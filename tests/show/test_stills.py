@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.image import imread
+from PIL import Image
 from support.browser import hue_share
 from support.kinematics import link_origins
 from support.pr2_reaches import ARM as PR2
@@ -13,7 +14,7 @@ from support.pr2_reaches import felt, spheres
 from support.reaches import free_space, reach_request, small_clutter
 from support.worlds import ARM, cylinder, make_clutter
 
-from lic_drake.errors import RenderingError
+from lic_drake.errors import LicError, RenderingError
 from lic_drake.evaluate.trial import Attempt
 from lic_drake.perception.image import CameraImage
 from lic_drake.reach.session import instance_of, make_record, simulate_request
@@ -21,6 +22,8 @@ from lic_drake.reach.trace import ReachTrace, SceneState
 from lic_drake.robots.pr2 import Q_HOME
 from lic_drake.select.situation import Selection
 from lic_drake.show.figures import ShownTrial
+from lic_drake.show.film import film_frames, save_film
+from lic_drake.show.pictures import save_rendered
 from lic_drake.show.stills import CAMERA, Still, StillCamera, draw_still, save_stills
 
 P_WG = np.array([0.62, -0.3, 0.0])
@@ -42,18 +45,15 @@ def attempt() -> tuple[Attempt, ReachTrace]:
     return Attempt(selection=selection, request=REQUEST, record=record), result.trace
 
 
-def save(
-    attempts: list[tuple[Attempt, ReachTrace]], out: Path, lines: list[str]
-) -> dict[str, Path]:
+def shown(attempts: list[tuple[Attempt, ReachTrace]]) -> ShownTrial:
     done, traces = [done for done, _ in attempts], [trace for _, trace in attempts]
-    trial = ShownTrial(
+    return ShownTrial(
         scenario=REQUEST.scenario,
         instance=instance_of(REQUEST),
         p_WG=REQUEST.goal,
         attempts=done,
         traces=traces,
     )
-    return save_stills(trial, out, lines.append)
 
 
 @pytest.mark.usefixtures("_renderer")
@@ -61,11 +61,10 @@ def test_each_attempt_has_a_start_a_middle_and_an_end(
     attempt: tuple[Attempt, ReachTrace], tmp_path: Path
 ) -> None:
     never = (attempt[0], ReachTrace())
-    lines: list[str] = []
-    files = save([attempt, never], tmp_path, lines)
+    camera = StillCamera(REQUEST.scenario, instance_of(REQUEST), REQUEST.goal)
+    files = save_stills(shown([attempt, never]), camera, tmp_path)
     names = [f"attempt1_{name}.png" for name in ("start", "middle", "end")]
     assert [path.name for path in files.values()] == names
-    assert lines == []
     start, middle, end = (imread(path)[..., :3] for path in files.values())
     assert start.shape == (720, 960, 3)
     # The arm has moved.
@@ -73,6 +72,27 @@ def test_each_attempt_has_a_start_a_middle_and_an_end(
     # At its hardest, and only where it touches, there is an arrow.
     assert crimson(middle) > 1e-4
     assert crimson(start) < 1e-5
+
+
+@pytest.mark.usefixtures("_renderer", "_coarse")
+def test_a_film_shows_all_attempts_from_start_to_end_and_holds_their_ends(
+    attempt: tuple[Attempt, ReachTrace], tmp_path: Path
+) -> None:
+    trial = shown([attempt, attempt])
+    frames = film_frames(trial)
+    half, odd = divmod(len(frames), 2)
+    assert half > 2 and not odd
+    assert [i for i, f in enumerate(frames) if f.duration_ms == 1500] == [half - 1, len(frames) - 1]
+    begin, end = (frame.picture.astype(float) for frame in (frames[0], frames[half - 1]))
+    assert np.mean(np.abs(begin - end).max(axis=2) > 25.0) > 0.01
+    # Between the attempts only the caption and the objects that were moved differ.
+    np.testing.assert_array_equal(frames[half].picture[60:], frames[0].picture[60:])
+    save_film(frames, tmp_path / "film.webp")
+    with Image.open(tmp_path / "film.webp") as film:
+        assert getattr(film, "n_frames", 1) == len(frames)
+        assert film.size == begin.shape[1::-1]
+    with pytest.raises(LicError, match="cannot write"):
+        save_film(frames, tmp_path / "missing" / "film.webp")
 
 
 def crimson(image: np.ndarray) -> float:
@@ -83,12 +103,13 @@ def test_without_a_renderer_a_line_says_what_to_install(
     attempt: tuple[Attempt, ReachTrace], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def broken(*args: object) -> None:
-        raise RenderingError("cameras cannot be simulated; install it with: apt-get install x")
+        raise RenderingError("cameras cannot be simulated; install it with: apt-get x")
 
     monkeypatch.setattr("lic_drake.show.stills.make_renderer", broken)
     lines: list[str] = []
-    assert save([attempt], tmp_path, lines) == {}
-    assert lines == ["no stills: cameras cannot be simulated; install it with: apt-get install x"]
+    assert save_rendered(shown([attempt]), tmp_path, lines.append) == {}
+    (line,) = lines
+    assert line == "no stills and no film: cameras cannot be simulated; install it with: apt-get x"
     assert list(tmp_path.iterdir()) == []
 
 

@@ -59,7 +59,7 @@ def test_at_apertures_every_pose_of_the_line_is_there_that_the_track_allows() ->
             (round(p_WA[1], 9), round(p_WA[1] - y, 9), round(phi, 9))
             for p_WA in APERTURES.p_WA
             for _, y, phi in poses.x0
-            if abs(round(p_WA[1] - y, 9)) <= 0.8
+            if abs(round(p_WA[1] - y, 9)) <= APERTURES.track.y_max_m
         }
         found = [tuple(np.round([s.x0[1], s.b0[1], s.x0[2]], 9)) for s in some]
         assert len(found) == len(expected)
