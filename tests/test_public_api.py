@@ -7,7 +7,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from support.made_up import part_of_shipped
 
 import lic_drake
 
@@ -50,13 +49,8 @@ def test_unknown_names_are_attribute_errors():
         lic_drake.reach_everything  # noqa: B018
 
 
-def test_the_readmes_example_runs(tmp_path, monkeypatch, capsys):
-    def part(category):
-        return part_of_shipped(tmp_path / category, category, 20).path
-
-    monkeypatch.setattr(lic_drake, "shipped_library", part, raising=False)
+def test_the_readmes_example_prints_what_the_readme_says(capsys):
     (example,) = re.findall(r"```python\n(.*?)```", README.read_text("utf-8"), re.DOTALL)
     exec(compile(example, "README", "exec"), {})
-    *_, last = lines = capsys.readouterr().out.splitlines()
-    assert len(lines) <= 2
-    assert re.search(r"\[ *0\.335 .*\] 0\.\d+ reached$", last)
+    outcomes = [line.split()[-1] for line in capsys.readouterr().out.splitlines()]
+    assert outcomes == ["force", "reached"]

@@ -77,7 +77,7 @@ def draw_density(
     """
     y, phi = (lattice.in_R[:, k].reshape(DENSITY_SHAPE) for k in (1, 2))
     values = probability.reshape(DENSITY_SHAPE)
-    image = ax.pcolormesh(y, phi, values, cmap="jet", vmin=0.0, vmax=1.0, shading="nearest")
+    image = ax.pcolormesh(y, phi, values, cmap="viridis", vmin=0.0, vmax=1.0, shading="nearest")
     color = ATTEMPT_COLORS[(number - 1) % len(ATTEMPT_COLORS)]
     (star,) = ax.plot(*chosen.x0_R[1:], "*", ms=16, color=color, label=f"attempt {number}")
     star.set(markeredgecolor="white", clip_on=False)
