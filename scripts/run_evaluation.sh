@@ -27,31 +27,20 @@ for category in "cylinder-clutter 200 10" "passage-clutter 2000 1" "cylinder-ape
     # Other second choices after LIC-1's failures.
     evaluate $category --methods gp1 'gp>cost' 'gp>rnd'
 done
-# How much it matters that the first attempt moved objects.
-evaluate cylinder-clutter 200 10 --methods rnd cost gp --fresh --variant fresh
-# LIC-2 from real second attempts.
-python scripts/second_attempts/run.py models/experience/cylinder-clutter \
-    $results/second_attempts/cylinder-clutter --first 20 --environments 20
-evaluate cylinder-clutter 200 10 --methods gp --variant real-pairs \
-    --second-attempts $results/second_attempts/cylinder-clutter
 # Five attempts.
 evaluate cylinder-clutter 50 10 --methods rnd cost gp --attempts 5 --variant five-attempts
 
-# Bounds, and LIC's two attempts at the same goals.
-python scripts/bounds/run.py cylinder-clutter --stream holdout --environments 40 --goals 10 \
-    --common-goals
-python scripts/bounds/run.py passage-clutter --stream holdout --environments 300
-python scripts/bounds/run.py cylinder-aperture-clutter --stream evaluation --environments 100
-evaluate_on_bounds() {
-    category=$1
-    shift
-    lic evaluate "$results/bounds/$category" --library "models/experience/$category" \
-        --methods gp "$@"
-}
-evaluate_on_bounds cylinder-clutter --stream holdout --common-goals --environments 40 --goals 10
-evaluate_on_bounds passage-clutter --stream holdout --environments 300
-evaluate_on_bounds cylinder-aperture-clutter --environments 100
+# Bounds: at goals of the evaluation, and at those of the library.
+python scripts/bounds/run.py cylinder-clutter --environments 60 --goals 10
+python scripts/bounds/run.py cylinder-clutter --stream holdout --environments 60 --grid-goals
+python scripts/bounds/run.py passage-clutter --environments 300
+python scripts/bounds/run.py cylinder-aperture-clutter --environments 200
+# From the libraries: how much experience it takes, what features and settings bring.
 python scripts/learning_curve/run.py
+python scripts/cross_validation/run.py models/experience/cylinder-clutter \
+    --out $results/cross_validation
+python scripts/ablation/run.py models/experience/passage-clutter models/experience/cylinder-clutter
+python scripts/real_experience/run.py
 
 # The PR2, with half of the apertures blocked; base and torso move, or stay.
 evaluate_pr2() {
