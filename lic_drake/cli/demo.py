@@ -21,7 +21,11 @@ _CATEGORIES = {
 }
 """Categories of each robot, the default one first."""
 
-_SEEDS = {"cylinder-clutter": 13, "passage-clutter": 24}
+_SEEDS = {
+    "cylinder-clutter": 13,
+    "passage-clutter": 24,
+    "cylinder-aperture-clutter": 73,
+}
 """Environments in which the first attempt fails and the second succeeds, else 0."""
 
 
