@@ -2,9 +2,11 @@
 
 import itertools
 import json
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -90,7 +92,8 @@ def demonstrate(
     def select_with(name: str) -> Selector:
         rng = np.random.default_rng(seed)
         columns, category = library.columns(), scenario.category
-        return make_selector(name, scenario.arm(), columns, rng, category)
+        aside = partial(print, file=sys.stderr, flush=True)
+        return make_selector(name, scenario.arm(), columns, rng, category, say=aside)
 
     selector = select_with(method)
     observer = None
