@@ -54,12 +54,16 @@ def kept_path(name: str, features: FeatureMap, rows: ExperienceRows) -> Path | N
     for path in _CODE:
         digest.update(path.read_bytes())
     for array in astuple(rows):
-        digest.update(f"{array.dtype}{array.shape}".encode() + np.ascontiguousarray(array).tobytes())
+        digest.update(
+            f"{array.dtype}{array.shape}".encode() + np.ascontiguousarray(array).tobytes()
+        )
     return folder / f"{name}-{digest.hexdigest()}.npz"
 
 
-def read_settings(path: Path, say: Callable[[str], None]) -> dict[str, Any] | None:
-    """Returns constructor arguments that were kept, None if there are none.
+def read_settings(
+    path: Path, estimator: SuccessEstimator, num_features: int, say: Callable[[str], None]
+) -> dict[str, Any] | None:
+    """Returns constructor arguments that were kept for an unfitted estimator, None if none were.
 
     A damaged or foreign file is not trusted; `say` receives a line about it.
     """
@@ -68,8 +72,11 @@ def read_settings(path: Path, say: Callable[[str], None]) -> dict[str, Any] | No
             arrays = dict(file)
         if str(arrays.pop("kept_as")) != path.name:
             raise ValueError("it was kept under another name")
-        if not all(np.all(np.isfinite(array)) for array in arrays.values()):
-            raise ValueError("its numbers are not finite")
+        if {name.split(".")[0] for name in arrays} != set(estimator._chosen):
+            raise ValueError(f"it holds {', '.join(arrays) or 'nothing'}")
+        for name, array in arrays.items():
+            if array.shape not in ((), (num_features,)) or not np.all(np.isfinite(array)):
+                raise ValueError(f"{name} has another shape, or is not finite")
         return _from_arrays(arrays)
     except FileNotFoundError:
         return None
@@ -117,4 +124,6 @@ def _from_arrays(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
             parts[name, inner[0]][inner[1]] = array
         else:
             values[name] = array if array.ndim else array.item()
-    return values | {name: _KINDS[kind](**_from_arrays(part)) for (name, kind), part in parts.items()}
+    return values | {
+        name: _KINDS[kind](**_from_arrays(part)) for (name, kind), part in parts.items()
+    }

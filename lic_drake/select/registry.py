@@ -130,7 +130,7 @@ def fit_model(
 
     rows, fitted = features.rows(columns), make_estimator(estimator, features)
     path, part = kept_path(estimator, features, rows), rows.simulated
-    known = None if path is None else read_settings(path, say)
+    known = None if path is None else read_settings(path, fitted, rows.X.shape[1], say)
     if known is not None:
         fitted.set_params(**known).fit(rows.X, rows.y, sample_weight=rows.weight)
         return SuccessModel(estimator=fitted, features=features)
