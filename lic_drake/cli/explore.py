@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from lic_drake.reach.scenario import Scenario
 
-_PAUSE_S = 0.05
+_PAUSE_S, _LAST_PORT = 0.05, 65535
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -133,12 +133,14 @@ def _listen(scenario: "Scenario", port: int | None) -> "Meshcat":
     from lic_drake.show.screen import open_meshcat
 
     try:
-        return open_meshcat(scenario.arm().is_planar, port)
-    except (RuntimeError, ValueError, TypeError) as error:
-        raise LicError(
-            f"cannot listen on port {'7000 to 7999' if port is None else port}, which may be in"
-            " use or not allowed; choose another --port from 1024 to 65535"
-        ) from error
+        if port is None or port <= _LAST_PORT:  # Meshcat would take what is left modulo 65536.
+            return open_meshcat(scenario.arm().is_planar, port)
+    except RuntimeError:
+        pass
+    raise LicError(
+        f"cannot listen on port {'7000 to 7999' if port is None else port}, which is in use or does"
+        f" not exist; choose another --port from 1024 to {_LAST_PORT}"
+    )
 
 
 def _announce(meshcat: "Meshcat") -> None:
@@ -147,6 +149,6 @@ def _announce(meshcat: "Meshcat") -> None:
 
     print(
         f"open {meshcat.web_url()} (from another machine http://{socket.gethostname()}:"
-        f"{meshcat.port()}); Ctrl-C ends it",
+        f"{meshcat.port()}) and its controls; Ctrl-C ends it",
         flush=True,
     )

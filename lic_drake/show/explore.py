@@ -28,7 +28,7 @@ STREAM = "evaluation"
 REACH, AGAIN, AGAIN_KEY = "reach", "try again", "KeyT"
 """Buttons; the second one appears after a failure."""
 
-ESTIMATE, ENVIRONMENT = "estimated success [%]", "environment"
+ESTIMATE, ENVIRONMENT = "success [%]", "environment"
 """Sliders that every category has; the first one only shows a number."""
 
 NUM_ENVIRONMENTS = 100
@@ -60,7 +60,7 @@ def goal_sliders(scenario: Scenario) -> dict[str, Slider]:
         offered = [scenario.sample_goal(STREAM, i) for i in range(_OFFERED_GOALS)]
         low, high = np.min(offered, axis=0), np.max(offered, axis=0)
     return {
-        name: Slider(np.floor(100 * low[k]) / 100, np.ceil(100 * high[k]) / 100, 0.01, first[k])
+        name: Slider(*np.round((low[k], high[k]), 2), 0.01, first[k])
         for name, k in _AXES.items()
         if f"goal_{'xyz'[k]}" in features.goal
     }
@@ -74,7 +74,7 @@ def aperture_sliders(scenario: Scenario) -> dict[str, tuple[str, Slider]]:
         return {"blocked apertures": ("num_blocked", Slider(0, most, 1, clutter.num_blocked))}
     if hasattr(clutter, "num_apertures"):
         count = clutter.num_apertures
-        return {"apertures": ("num_apertures", Slider(1, count + 3, 1, count))}
+        return {"apertures": ("num_apertures", Slider(1, count, 1, count))}
     return {}
 
 

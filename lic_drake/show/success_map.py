@@ -14,7 +14,7 @@ from lic_drake.types import Vector
 
 # A planar mark is an arrow of this length, metres; a mark in space leaves the middle of an aperture
 # free for the hand.
-_ARROW_M, _INNER = 0.05, 0.75
+_ARROW_M, _INNER = 0.08, 0.65
 _LARGEST_MARK_M, _UNKNOWN = 0.09, (0.6, 0.6, 0.6)
 _SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
@@ -76,6 +76,7 @@ def mark_starts(found: SuccessMap) -> ColorMesh:
     x0, n = found.starts.x0, len(found.starts)
     colors = colormaps["viridis"](np.nan_to_num(found.probability))[:, :3]
     colors[np.isnan(found.probability)] = _UNKNOWN
+    colors **= 2.2  # Meshcat takes the colours of vertices as linear.
     axes = 2 if x0.shape[1] == IN_PLANE else 3
     apart = np.linalg.norm(x0[:, None, :axes] - x0[None, :, :axes], axis=2)
     nearest = np.min(apart + np.diag(np.full(n, np.inf)), initial=np.inf)
