@@ -93,7 +93,8 @@ def keep_settings(path: Path, fitted: SuccessEstimator, say: Callable[[str], Non
         # Several processes may fit the same at a time.
         with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".tmp", delete=False) as file:
             temporary = file.name
-            np.savez(file, kept_as=np.array(path.name), **_to_arrays(fitted.chosen))
+            arrays: dict[str, Any] = {"kept_as": path.name, **_to_arrays(fitted.chosen)}
+            np.savez(file, **arrays)
         os.replace(temporary, path)
     except OSError as error:
         if temporary is not None:

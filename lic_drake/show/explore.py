@@ -1,5 +1,6 @@
 """The live view: sliders move the goal and change the clutter; map and chosen start follow."""
 
+import gc
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -60,7 +61,7 @@ def goal_sliders(scenario: Scenario) -> dict[str, Slider]:
         offered = [scenario.sample_goal(STREAM, i) for i in range(_OFFERED_GOALS)]
         low, high = np.min(offered, axis=0), np.max(offered, axis=0)
     return {
-        name: Slider(*np.round((low[k], high[k]), 2), 0.01, first[k])
+        name: Slider(round(low[k], 2), round(high[k], 2), 0.01, first[k])
         for name, k in _AXES.items()
         if f"goal_{'xyz'[k]}" in features.goal
     }
@@ -106,6 +107,7 @@ class Explorer:
         meshcat.AddSlider(ESTIMATE, 0, 100, 1, 0)
         meshcat.AddButton(REACH, "KeyR")
         self._clicks = 0
+        self._last: tuple[ReachRequest, ReachRecord, ReachTrace] | None = None
         self._change_environment()
         self._begin()
 
@@ -180,6 +182,7 @@ class Explorer:
         self._starts = make_starts(self._scenario, instance)
         self._springs_back = instance.stems is not None
         self._screen = Screen(self._meshcat, self._scenario, instance)
+        gc.collect()  # The last screen's diagram is in a reference cycle: 4 MB.
 
     def _begin(self) -> None:
         """Begins a trial at the goal of the sliders."""
@@ -203,7 +206,7 @@ class Explorer:
         self._follow(trace)
 
     def _forget(self) -> None:
-        self._last: tuple[ReachRequest, ReachRecord, ReachTrace] | None = None
+        self._last = None
         self._meshcat.DeleteButton(AGAIN, strict=False)
 
     def _follow(self, left: ReachTrace | None = None) -> None:

@@ -1,13 +1,10 @@
-import threading
 import time
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from pydrake.geometry import Meshcat
-from support.browser import move_slider
 from support.made_up import planar_library, sphere_library
 
 from lic_drake.errors import RequestError
@@ -170,30 +167,3 @@ def test_starts_near_failed_ones_are_unknown(plane: tuple[Scenario, LicSelector]
     np.testing.assert_array_equal(np.isnan(after.probability), near)
     grey = mark_starts(after).colors.T.reshape(-1, 3, 3)[near]
     assert np.ptp(grey) == 0.0
-
-
-@pytest.mark.slow
-@pytest.mark.browser
-def test_a_browser_s_slider_moves_the_picture(
-    plane: tuple[Scenario, LicSelector], tmp_path: Path, chromium: str
-) -> None:
-    meshcat, done = open_meshcat(in_plane=True), threading.Event()
-    pictures: list[np.ndarray] = []
-
-    def browse() -> None:
-        try:
-            address = f"http://127.0.0.1:{meshcat.port()}"
-            pictures.extend(move_slider(chromium, address, tmp_path, GOAL_Y, -0.3, settle_s=8.0))
-        finally:
-            done.set()
-
-    explorer = Explorer(meshcat, *plane, say=lambda line: None)
-    browser = threading.Thread(target=browse)
-    browser.start()
-    while not done.is_set():
-        if not explorer.step():
-            time.sleep(0.02)
-    browser.join()
-    before, after = pictures
-    assert explorer._situation.p_WG[1] == pytest.approx(-0.3)
-    assert np.mean(np.abs(after - before).max(axis=2) > 0.1) > 2e-3
