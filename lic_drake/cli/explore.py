@@ -9,6 +9,7 @@ from lic_drake.cli.arguments import (
     Subparsers,
     add_command,
     remark,
+    uncollected,
     whole_number,
 )
 from lic_drake.errors import LicError
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from pydrake.geometry import Meshcat
 
     from lic_drake.reach.scenario import Scenario
+    from lic_drake.show.explore import Explorer
 
 _PAUSE_S, _LAST_PORT = 0.05, 65535
 
@@ -69,6 +71,14 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Explores until it is interrupted."""
+    with uncollected():  # So that the collector is quick when a slider moves, too.
+        explorer = _explorer(args)
+    explorer.run()
+    return 0
+
+
+def _explorer(args: argparse.Namespace) -> "Explorer":
+    """Returns what the arguments ask for, after saying where it is seen."""
     from lic_drake.experience.store import ExperienceLibrary
     from lic_drake.select.lic import LicSelector
     from lic_drake.select.registry import make_selector, needs_library
@@ -90,8 +100,7 @@ def run(args: argparse.Namespace) -> int:
 
     explorer = Explorer(meshcat, scenario, selector)
     _announce(meshcat)
-    explorer.run()
-    return 0
+    return explorer
 
 
 def run_replay(args: argparse.Namespace) -> int:

@@ -2,7 +2,14 @@
 
 import argparse
 
-from lic_drake.cli.arguments import DEFAULT_SCENARIO, Subparsers, add_command, print_result, remark
+from lic_drake.cli.arguments import (
+    DEFAULT_SCENARIO,
+    Subparsers,
+    add_command,
+    print_result,
+    remark,
+    uncollected,
+)
 from lic_drake.paths import shipped_library
 
 
@@ -31,6 +38,7 @@ def add_parser(subparsers: Subparsers) -> None:
     )
 
 
+@uncollected()
 def run(args: argparse.Namespace) -> int:
     """Selects and prints the start."""
     import numpy as np
