@@ -115,7 +115,7 @@ def run_replay(args: argparse.Namespace) -> int:
         raise LicError(f"{library.path} has rows 0 to {len(rows) - 1}, got {args.row}")
     from lic_drake.experience.schema import to_records
     from lic_drake.show.explore import describe_record, play_request
-    from lic_drake.show.screen import Screen
+    from lic_drake.show.stage import Screen
 
     (record,) = to_records(rows.slice(args.row, 1))
     if record.source != SIMULATION:
@@ -139,7 +139,7 @@ def run_replay(args: argparse.Namespace) -> int:
 
 def _listen(scenario: "Scenario", port: int | None) -> "Meshcat":
     """Returns a Meshcat at a port; a LicError if that is in use."""
-    from lic_drake.show.screen import open_meshcat
+    from lic_drake.show.stage import open_meshcat
 
     try:
         if port is None or port <= _LAST_PORT:  # Meshcat would take what is left modulo 65536.

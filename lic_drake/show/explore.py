@@ -18,9 +18,9 @@ from lic_drake.reach.start import describe_start
 from lic_drake.reach.trace import ReachTrace, SceneState
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.situation import FailedReach, Situation
+from lic_drake.show.density import map_success, mark_starts
 from lic_drake.show.recording import frame_rate
-from lic_drake.show.screen import NEUTRAL, Screen
-from lic_drake.show.success_map import map_success, mark_starts
+from lic_drake.show.stage import NEUTRAL, Screen
 from lic_drake.starts import make_starts
 
 STREAM = "evaluation"

@@ -11,7 +11,7 @@ from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.show.approach import Approach
 from lic_drake.show.page import embed
-from lic_drake.show.screen import Screen, open_meshcat
+from lic_drake.show.stage import Screen, open_meshcat
 from lic_drake.types import Vector
 
 PAUSE_S = 1.0

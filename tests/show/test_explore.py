@@ -14,9 +14,9 @@ from lic_drake.select.lic import LicSelector
 from lic_drake.select.registry import make_selector
 from lic_drake.select.situation import FailedReach, Situation
 from lic_drake.show import explore
+from lic_drake.show.density import map_success, mark_starts
 from lic_drake.show.explore import AGAIN, ENVIRONMENT, ESTIMATE, REACH, Explorer
-from lic_drake.show.screen import open_meshcat
-from lic_drake.show.success_map import map_success, mark_starts
+from lic_drake.show.stage import open_meshcat
 from lic_drake.starts import make_starts
 
 GOAL_Y = "goal y [m]"
