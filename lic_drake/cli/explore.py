@@ -2,18 +2,19 @@
 
 import argparse
 import time
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lic_drake.cli.arguments import (
     DEFAULT_SCENARIO,
     Subparsers,
     add_command,
+    quick_imports,
     remark,
-    uncollected,
     whole_number,
 )
 from lic_drake.errors import LicError
-from lic_drake.paths import find_library, shipped_libraries
+from lic_drake.paths import find_library, shipped_libraries, shipped_library
 
 if TYPE_CHECKING:
     from pydrake.geometry import Meshcat
@@ -32,8 +33,8 @@ def add_parser(subparsers: Subparsers) -> None:
         run,
         "explore estimates and reaches live in a browser",
         "Sliders move the goal, change the environment and block apertures; the map of estimated"
-        " success (yellow: likely, violet: unlikely) and the chosen start follow. A button reaches."
-        " Prints the address; Ctrl-C ends it.",
+        " success (yellow: likely, violet: unlikely) and the chosen start follow. Buttons reach,"
+        " and go to another category. Prints the address; Ctrl-C ends it.",
         "lic explore sphere-aperture-clutter --port 7005",
         ["--method"],
     )
@@ -70,37 +71,42 @@ def add_parser(subparsers: Subparsers) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Explores until it is interrupted."""
-    with uncollected():  # So that the collector is quick when a slider moves, too.
-        explorer = _explorer(args)
-    explorer.run()
-    return 0
+    """Explores one category after the other until it is interrupted."""
+    from lic_drake.select.registry import check_method, needs_library
 
-
-def _explorer(args: argparse.Namespace) -> "Explorer":
-    """Returns what the arguments ask for, after saying where it is seen."""
-    from lic_drake.experience.store import ExperienceLibrary
-    from lic_drake.select.lic import LicSelector
-    from lic_drake.select.registry import make_selector, needs_library
-
+    shipped = [library.name for library in shipped_libraries()]
     path = find_library(args.category)
     if not path.exists():
-        known = ", ".join(library.name for library in shipped_libraries())
+        known = ", ".join(shipped)
         raise LicError(f"no category or library {args.category!r}; choose one of {known}")
     if not needs_library(args.method):
         raise LicError(f"--method {args.method} estimates nothing to be shown; choose gp or knn")
-    library = ExperienceLibrary(path)
-    scenario = library.scenario()
-    meshcat = _listen(scenario, args.port)
-    columns, category = library.columns(), scenario.category
-    selector = make_selector(args.method, scenario.arm(), columns, None, category, say=remark)
-    if not isinstance(selector, LicSelector):
+    if len(check_method(args.method)) > 1:
         raise LicError(f"--method {args.method} is two strategies; choose one, gp or knn")
+    with quick_imports():  # So that the collector is quick when a slider moves, too.
+        from lic_drake.experience.store import ExperienceLibrary
+
+        meshcat = _listen(ExperienceLibrary(path).scenario(), args.port)
+        explorer = _explore(meshcat, path, args.method)
+    _announce(meshcat)
+    while True:
+        path = shipped_library(explorer.run([name for name in shipped if name != path.name]))
+        explorer = _explore(meshcat, path, args.method)
+
+
+def _explore(meshcat: "Meshcat", path: Path, method: str) -> "Explorer":
+    """Shows the category of a library, after learning from it."""
+    from lic_drake.experience.store import ExperienceLibrary
+    from lic_drake.select.lic import LicSelector
+    from lic_drake.select.registry import make_selector
     from lic_drake.show.explore import Explorer
 
-    explorer = Explorer(meshcat, scenario, selector)
-    _announce(meshcat)
-    return explorer
+    library = ExperienceLibrary(path)
+    scenario, columns = library.scenario(), library.columns()
+    remark(f"learning from {len(columns['success'])} reaches of {scenario.category}")
+    selector = make_selector(method, scenario.arm(), columns, None, scenario.category, say=remark)
+    assert isinstance(selector, LicSelector)
+    return Explorer(meshcat, scenario, selector)
 
 
 def run_replay(args: argparse.Namespace) -> int:

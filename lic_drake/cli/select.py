@@ -7,8 +7,8 @@ from lic_drake.cli.arguments import (
     Subparsers,
     add_command,
     print_result,
+    quick_imports,
     remark,
-    uncollected,
 )
 from lic_drake.paths import shipped_library
 
@@ -38,7 +38,7 @@ def add_parser(subparsers: Subparsers) -> None:
     )
 
 
-@uncollected()
+@quick_imports()
 def run(args: argparse.Namespace) -> int:
     """Selects and prints the start."""
     import numpy as np

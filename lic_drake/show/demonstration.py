@@ -2,11 +2,9 @@
 
 import itertools
 import json
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -92,8 +90,7 @@ def demonstrate(
     def select_with(name: str) -> Selector:
         rng = np.random.default_rng(seed)
         columns, category = library.columns(), scenario.category
-        aside = partial(print, file=sys.stderr, flush=True)
-        return make_selector(name, scenario.arm(), columns, rng, category, say=aside)
+        return make_selector(name, scenario.arm(), columns, rng, category, say=say)
 
     selector = select_with(method)
     observer = None

@@ -2,7 +2,7 @@
 
 import gc
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -20,7 +20,7 @@ from lic_drake.select.lic import LicSelector
 from lic_drake.select.situation import FailedReach, Situation
 from lic_drake.show.density import map_success, mark_starts
 from lic_drake.show.recording import frame_rate
-from lic_drake.show.stage import NEUTRAL, Screen
+from lic_drake.show.stage import NEUTRAL, Screen, look
 from lic_drake.starts import make_starts
 
 STREAM = "evaluation"
@@ -52,7 +52,7 @@ class Slider(NamedTuple):
 
 
 def goal_sliders(scenario: Scenario) -> dict[str, Slider]:
-    """Returns a slider for each coordinate of the goal that success is estimated from, metres."""
+    """Returns a slider for each coordinate of a goal, metres, that varies and that estimates use."""
     features = features_of(scenario.category).first
     area, first = scenario.task.goal_area, scenario.sample_goal(STREAM, 0)
     if area is not None:
@@ -63,7 +63,7 @@ def goal_sliders(scenario: Scenario) -> dict[str, Slider]:
     return {
         name: Slider(round(low[k], 2), round(high[k], 2), 0.01, first[k])
         for name, k in _AXES.items()
-        if f"goal_{'xyz'[k]}" in features.goal
+        if f"goal_{'xyz'[k]}" in features.goal and high[k] > low[k]
     }
 
 
@@ -84,7 +84,8 @@ class Explorer:
 
     A move of any slider begins a new trial. `reach` simulates the reach that the strategy selects,
     and plays it. After a failure, `try again` shows what is estimated and chosen next, in the
-    clutter as it was left.
+    clutter as it was left. While a slider moves to other environments, their maps and the arm are
+    shown; the clutter follows when it rests.
     """
 
     def __init__(
@@ -94,7 +95,9 @@ class Explorer:
         selector: LicSelector,
         say: Callable[[str], None] = print,
     ) -> None:
-        """Adds the sliders, and shows the first environment."""
+        """Replaces the controls, and shows the first environment."""
+        meshcat.DeleteAddedControls()
+        look(meshcat, scenario.arm().is_planar)
         self._meshcat, self._original, self._selector, self._say = meshcat, scenario, selector, say
         self._apertures = aperture_sliders(scenario)
         self._sliders = {
@@ -109,11 +112,17 @@ class Explorer:
         self._clicks = 0
         self._last: tuple[ReachRequest, ReachRecord, ReachTrace] | None = None
         self._change_environment()
+        self._show_environment()
         self._begin()
 
-    def run(self) -> None:
-        """Follows until it is interrupted."""
+    def run(self, others: Sequence[str]) -> str:
+        """Follows until another category is asked for, with the buttons that it adds for them."""
+        for name in others:
+            self._meshcat.AddButton(name)
         while True:
+            for name in others:
+                if self._meshcat.GetButtonClicks(name):
+                    return name
             if not self.step():
                 time.sleep(_IDLE_S)
 
@@ -125,6 +134,9 @@ class Explorer:
             if changed & {ENVIRONMENT, *self._apertures}:
                 self._change_environment()
             self._begin()
+        elif not self._is_shown:
+            self._show_environment()
+            self._follow()
         elif (clicks := self._meshcat.GetButtonClicks(REACH)) != self._clicks:
             self._clicks = clicks
             self._attempt(self.reach)
@@ -167,21 +179,25 @@ class Explorer:
         return self._values() != self._shown
 
     def _change_environment(self) -> None:
-        """Draws another environment, whose own goal is taken if it offers only one."""
+        """Goes to another environment, and to its own goal if it offers only one."""
         values = self._values()
         clutter: Any = self._original.clutter
         for name, (parameter, _) in self._apertures.items():
             clutter = replace(clutter, **{parameter: int(values[name])})
         self._scenario = replace(self._original, clutter=clutter)
         index = int(values[ENVIRONMENT])
-        instance = self._scenario.sample_instance(STREAM, index)
+        self._instance = self._scenario.sample_instance(STREAM, index)
         self._goal = self._scenario.sample_goal(STREAM, index)
         if self._scenario.task.goal_area is None:
             for name in _AXES.keys() & values.keys():
                 self._meshcat.SetSliderValue(name, self._goal[_AXES[name]])
-        self._starts = make_starts(self._scenario, instance)
-        self._springs_back = instance.stems is not None
-        self._screen = Screen(self._meshcat, self._scenario, instance)
+        self._starts = make_starts(self._scenario, self._instance)
+        self._is_shown = False
+
+    def _show_environment(self) -> None:
+        """Builds and draws the environment, which takes longer than all else."""
+        self._screen = Screen(self._meshcat, self._scenario, self._instance)
+        self._is_shown = True
         gc.collect()  # The last screen's diagram is in a reference cycle: 4 MB.
 
     def _begin(self) -> None:
@@ -219,7 +235,7 @@ class Explorer:
         if best is None or best.q is None:
             return
         state = None
-        if q_clutter is not None and not self._springs_back:
+        if q_clutter is not None and self._instance.stems is None:  # Stems spring back.
             state = SceneState(best.q, 0.0 * best.q, q_clutter, 0.0 * q_clutter)
         self._screen.draw(best.b0, best.q, state)
         self._meshcat.SetSliderValue(ESTIMATE, round(100 * float(np.nanmax(found.probability))))

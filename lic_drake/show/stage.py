@@ -85,7 +85,6 @@ class Screen:
         drake_models: Path | None = None,
     ) -> None:
         """Builds the scene; for `drake_models` see `add_stage`."""
-        meshcat.Delete(_SCENE)
         self._meshcat = meshcat
         self._radius_m = scenario.stop.success_distance_m
         builder = DiagramBuilder()
@@ -96,6 +95,8 @@ class Screen:
         ContactVisualizer.AddToBuilder(builder, scene.plant, meshcat, arrows)
         self._diagram = builder.Build()
         self._context = self._diagram.CreateDefaultContext()
+        # Only now, so that there is no gap between the last scene and this one.
+        meshcat.Delete(_SCENE)
         self.initial: Vector = scene.plant.GetDefaultPositions(scene.arm)[3:]
 
     def draw(
@@ -120,6 +121,11 @@ class Screen:
         self._meshcat.SetProperty(_FORCES, "visible", visible, time_s)
 
 
+def look(meshcat: Meshcat, in_plane: bool) -> None:
+    """Looks at an arm in the plane or in space."""
+    meshcat.SetCameraPose(*(_PLANE_VIEW if in_plane else _SPACE_VIEW))
+
+
 def open_meshcat(in_plane: bool, port: int | None = None) -> Meshcat:
     """Returns a Meshcat that looks at an arm in the plane or in space, without logging its address.
 
@@ -136,5 +142,5 @@ def open_meshcat(in_plane: bool, port: int | None = None) -> Meshcat:
         meshcat.SetProperty("/Background/<object>", end, [0.97, 0.97, 0.98])
     for hidden in ("/Grid", "/Axes"):
         meshcat.SetProperty(hidden, "visible", False)
-    meshcat.SetCameraPose(*(_PLANE_VIEW if in_plane else _SPACE_VIEW))
+    look(meshcat, in_plane)
     return meshcat

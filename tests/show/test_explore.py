@@ -89,10 +89,27 @@ def test_a_moved_slider_moves_goal_map_and_arm(explorer: Explorer) -> None:
 
 def test_another_environment_is_drawn_in_place_of_the_first(explorer: Explorer) -> None:
     place = "/drake/visualizer/clutter/object3"
-    before = drawn(explorer._meshcat, place)
+    before, marks = drawn(explorer._meshcat, place), drawn(explorer._meshcat, "/map")
     explorer._meshcat.SetSliderValue(ENVIRONMENT, 1)
     assert explorer.step()
+    assert drawn(explorer._meshcat, "/map") != marks
+    # The clutter is drawn when the slider rests.
+    assert drawn(explorer._meshcat, place) == before
+    assert explorer.step()
     assert drawn(explorer._meshcat, place) != before
+    assert not explorer.step()
+
+
+def test_another_category_takes_over_the_page(
+    explorer: Explorer, space: tuple[Scenario, LicSelector]
+) -> None:
+    meshcat = explorer._meshcat
+    meshcat.AddButton("sphere-aperture-clutter")
+    click(meshcat, "sphere-aperture-clutter")
+    assert explorer.run(["sphere-aperture-clutter"]) == "sphere-aperture-clutter"
+    Explorer(meshcat, *space, say=lambda line: None)
+    assert "blocked apertures" in meshcat.GetSliderNames()
+    assert meshcat.GetButtonNames() == [REACH]
 
 
 def test_after_a_failure_the_second_choice_is_shown_and_reached_from(
