@@ -52,7 +52,7 @@ class Slider(NamedTuple):
 
 
 def goal_sliders(scenario: Scenario) -> dict[str, Slider]:
-    """Returns a slider for each coordinate of a goal, metres, that varies and that estimates use."""
+    """Returns a slider for each coordinate of a goal, metres, that varies and is a feature."""
     features = features_of(scenario.category).first
     area, first = scenario.task.goal_area, scenario.sample_goal(STREAM, 0)
     if area is not None:
@@ -72,7 +72,7 @@ def aperture_sliders(scenario: Scenario) -> dict[str, tuple[str, Slider]]:
     clutter: Any = scenario.clutter
     if hasattr(clutter, "num_blocked"):
         most = clutter.rows * clutter.columns - 1
-        return {"blocked apertures": ("num_blocked", Slider(0, most, 1, clutter.num_blocked))}
+        return {"blocked": ("num_blocked", Slider(0, most, 1, clutter.num_blocked))}
     if hasattr(clutter, "num_apertures"):
         count = clutter.num_apertures
         return {"apertures": ("num_apertures", Slider(1, count, 1, count))}

@@ -93,7 +93,7 @@ def test_a_row_is_replayed_until_ctrl_c(brief: str) -> None:
 @pytest.mark.browser
 def test_a_slider_in_a_browser_moves_the_picture(tmp_path: Path, chromium: str) -> None:
     with showing("explore", "--method", "knn1") as address:
-        before, after = move_slider(chromium, address, tmp_path, "goal y", -0.3, settle_s=8.0)
+        before, after = move_slider(chromium, address, tmp_path, "goal y [m]", -0.3, settle_s=8.0)
     assert_shows_a_scene(before)
     assert_shows_a_scene(after)
     assert np.mean(np.abs(after - before).max(axis=2) > 0.1) > 2e-3

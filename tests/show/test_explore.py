@@ -108,7 +108,7 @@ def test_another_category_takes_over_the_page(
     click(meshcat, "sphere-aperture-clutter")
     assert explorer.run(["sphere-aperture-clutter"]) == "sphere-aperture-clutter"
     Explorer(meshcat, *space, say=lambda line: None)
-    assert "blocked apertures" in meshcat.GetSliderNames()
+    assert "blocked" in meshcat.GetSliderNames()
     assert meshcat.GetButtonNames() == [REACH]
 
 
@@ -158,7 +158,7 @@ def test_blocked_apertures_leave_the_map(space: tuple[Scenario, LicSelector]) ->
     meshcat = open_meshcat(in_plane=False)
     explorer = Explorer(meshcat, *space, say=lambda line: None)
     for blocked in (12, 15):
-        meshcat.SetSliderValue("blocked apertures", blocked)
+        meshcat.SetSliderValue("blocked", blocked)
         assert explorer.step()
         found = map_success(explorer._selector, explorer._situation)
         assert len(found.starts) <= 20 - blocked

@@ -40,9 +40,11 @@ def visit(
     return imread(picture)[:, :, :3], console
 
 
+_OPEN = """for (const button of document.querySelectorAll(".close-button"))
+  if (button.textContent === "Open Controls") button.click();"""
 _MOVE = """(([name, value]) => {
   for (const row of document.querySelectorAll("li.cr"))
-    if (row.textContent.includes(name)) {
+    if (row.querySelector(".property-name")?.textContent === name) {
       const input = row.querySelector("input");
       input.value = value;
       input.dispatchEvent(new Event("change"));
@@ -75,6 +77,7 @@ def move_slider(
 
         async def look() -> np.ndarray:
             await asyncio.sleep(settle_s)
+            await call("Runtime.evaluate", expression=_OPEN)
             data = (await call("Page.captureScreenshot"))["data"]
             return imread(io.BytesIO(base64.b64decode(data)))[:, :, :3]
 
