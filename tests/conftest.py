@@ -9,6 +9,7 @@ import pytest
 from hypothesis import settings
 
 os.environ["MPLBACKEND"] = "Agg"
+os.environ["LIC_CACHE"] = "off"  # Tests fit, unless they are about kept fits.
 # Several test processes share the cores, where threads that wait for each other take most of the
 # time: scikit-learn's trees needed 30 s instead of 2.
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):

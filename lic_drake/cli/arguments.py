@@ -1,10 +1,13 @@
 """What subcommands share: how they are declared, common options, exit codes, output."""
 
 import argparse
+import gc
 import json
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from importlib import import_module
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from lic_drake.paths import find_library
@@ -119,6 +122,32 @@ def add_count(
     """Adds an option that takes a whole number with a minimum."""
     help = f"{help} (default: %(default)s)"
     parser.add_argument(name, metavar="N", type=whole_number(least), default=default, help=help)
+
+
+class _Postponed(ModuleType):
+    """Stands for a module until something in it is asked for."""
+
+    def __getattr__(self, name: str) -> object:
+        if sys.modules[self.__name__] is self:
+            del sys.modules[self.__name__]
+        return getattr(import_module(self.__name__), name)
+
+
+@contextmanager
+def quick_imports() -> Iterator[None]:
+    """Spares imports what takes a second and is not needed.
+
+    The garbage collector need not go through what they make, and scikit-learn imports scipy.stats
+    for functions that no estimator of this package calls. `importlib.util.LazyLoader` would do, but
+    for Python 3.12.0 to 3.12.2, where a second import statement loads the module.
+    """
+    sys.modules.setdefault("scipy.stats", _Postponed("scipy.stats"))
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.freeze()  # Most of it stays.
+        gc.enable()
 
 
 @contextmanager

@@ -8,6 +8,7 @@ from lic_drake.cli.arguments import (
     add_command,
     add_count,
     print_result,
+    quick_imports,
     remark,
     whole_number,
 )
@@ -83,12 +84,13 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Runs the demonstration and prints the files it has written."""
-    from lic_drake.experience.schema import scenario_text
-    from lic_drake.experience.store import ExperienceLibrary
-    from lic_drake.perception.config import load_cameras
-    from lic_drake.reach.scenario import load_scenario, parse_scenario
-    from lic_drake.show.demonstration import demonstrate
-    from lic_drake.show.pr2_meshes import find_drake_models
+    with quick_imports():
+        from lic_drake.experience.schema import scenario_text
+        from lic_drake.experience.store import ExperienceLibrary
+        from lic_drake.perception.config import load_cameras
+        from lic_drake.reach.scenario import load_scenario, parse_scenario
+        from lic_drake.show.demonstration import demonstrate
+        from lic_drake.show.pr2_meshes import find_drake_models
 
     category = args.category or _CATEGORIES[args.robot or "planar-arm"][0]
     foliage, meshes = category == _FOLIAGE, args.visuals == "drake_models"

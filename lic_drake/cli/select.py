@@ -2,7 +2,14 @@
 
 import argparse
 
-from lic_drake.cli.arguments import DEFAULT_SCENARIO, Subparsers, add_command, print_result
+from lic_drake.cli.arguments import (
+    DEFAULT_SCENARIO,
+    Subparsers,
+    add_command,
+    print_result,
+    quick_imports,
+    remark,
+)
 from lic_drake.paths import shipped_library
 
 
@@ -31,6 +38,7 @@ def add_parser(subparsers: Subparsers) -> None:
     )
 
 
+@quick_imports()
 def run(args: argparse.Namespace) -> int:
     """Selects and prints the start."""
     import numpy as np
@@ -53,7 +61,8 @@ def run(args: argparse.Namespace) -> int:
     check_goal(scenario, p_WG - bases[np.argmin(np.linalg.norm((bases - p_WG)[:, 1:], axis=1))])
     failed = tuple(read_failure(starts, text) for text in args.failed)
     rng = np.random.default_rng(args.seed)
-    selector = make_selector(args.method, scenario.arm(), library.columns(), rng, scenario.category)
+    columns, category = library.columns(), scenario.category
+    selector = make_selector(args.method, scenario.arm(), columns, rng, category, say=remark)
     if isinstance(selector, LicSelector) and selector.second is not None:
         needed = [name.removeprefix(FIRST_PREFIX) for name in selector.second.features.observed]
         for reach in failed:

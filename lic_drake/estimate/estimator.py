@@ -57,10 +57,14 @@ class SuccessEstimator(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[mis
         self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None
     ) -> Self:
         """Returns a new estimator fitted to other rows, with the settings that `fit` chose here."""
-        self._check_fitted()
-        chosen = {name: getattr(self, f"{name}_") for name in self._chosen}
-        other = cast(Self, clone(self).set_params(**chosen))
+        other = cast(Self, clone(self).set_params(**self.chosen))
         return other.fit(X, y, sample_weight=sample_weight)
+
+    @property
+    def chosen(self) -> dict[str, Any]:
+        """Constructor arguments that `fit` has chosen here, by name."""
+        self._check_fitted()
+        return {name: getattr(self, f"{name}_") for name in self._chosen}
 
     def values(self, X: ArrayLike) -> Vector:
         """Returns estimates for queries X, shape (n, d): shape (n,).

@@ -111,13 +111,17 @@ class Posterior:
 
     def mean(self, X: Vector) -> Vector:
         """Returns the posterior mean for queries X, shape (n, d): shape (n,)."""
-        correlation = l1_correlation(self.X, X, self.prior.theta)
-        return self.prior_mean + self.alpha @ (self.prior.signal_variance * correlation)
+        covariance = l1_correlation(self.X, X, self.prior.theta)
+        covariance *= self.prior.signal_variance
+        return self.prior_mean + self.alpha @ covariance
 
 
 def l1_correlation(A: Vector, B: Vector, theta: Vector) -> Vector:
     """Returns correlations (n, m) of rows of A (n, d) and B (m, d), with decay theta (d,)."""
-    return np.exp(-cdist(A * theta, B * theta, "cityblock"))
+    # In place: for the starts of a PR2 these are tens of megabytes.
+    result: Vector = cdist(A * theta, B * theta, "cityblock")
+    np.negative(result, out=result)
+    return np.exp(result, out=result)
 
 
 def negative_log_likelihood(

@@ -33,6 +33,11 @@ def make_estimator(name: str, features: FeatureMap = PLANAR_LIC1) -> "SuccessEst
     return _ESTIMATORS.get(name)(features)
 
 
+def is_built_in(name: str) -> bool:
+    """Returns whether an estimator is this package's own, not registered by others."""
+    return _ESTIMATORS.get(name) in (_process, _neighbours)
+
+
 def estimator_names() -> tuple[str, ...]:
     """Returns the names of all registered estimators, the default first."""
     return _ESTIMATORS.names()

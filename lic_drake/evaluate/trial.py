@@ -2,6 +2,7 @@
 
 import gc
 import math
+import sys
 import time
 from collections import defaultdict
 from collections.abc import Callable
@@ -223,9 +224,9 @@ class _Strategies:
         self._stream = evaluation.stream
         arm, category = scenario.arm(), scenario.category
         columns = ExperienceLibrary(evaluation.experience).columns()
-        self._fitted: Callable[[str], Selector] = cache(
-            partial(make_selector, arm=arm, columns=columns, category=category)
-        )
+        aside = partial(print, file=sys.stderr, flush=True)
+        make = partial(make_selector, columns=columns, category=category, say=aside)
+        self._fitted: Callable[[str], Selector] = cache(partial(make, arm=arm))
 
     def selector(self, method: str, environment: int, goal: int) -> Selector:
         """Returns the strategy for a trial."""

@@ -66,8 +66,9 @@ class Pr2Kinematics(Kinematics):
         """See `Kinematics.solve_pointing`; the wrist roll is 0, the middle of its range."""
         pan = self._pan_angles
         q, sample = self._solve_at(np.repeat(p_RE, len(pan), axis=0), u_R, np.tile(pan, len(p_RE)))
-        each = np.split(q, np.searchsorted(sample, len(pan) * np.arange(1, len(p_RE))))
-        return [row[np.argsort(self.calc_preselection_cost(row), kind="stable")] for row in each]
+        # Those of one position after the other, the cheapest first.
+        order = np.lexsort((self.calc_preselection_cost(q), sample // len(pan)))
+        return np.split(q[order], np.searchsorted(sample, len(pan) * np.arange(1, len(p_RE))))
 
     def _solve_at(self, p_RE: Vector, u_R: Vector, pan: Vector) -> tuple[Vector, IntVector]:
         """Returns configurations that point along u_R, and the index of each one's pan angle.

@@ -1,6 +1,7 @@
 """The known selection strategies by name."""
 
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -19,6 +20,10 @@ from lic_drake.select.situation import Selection, Situation
 
 type Columns = Mapping[str, NDArray[Any]]
 """Columns of a library by name."""
+
+
+def _silent(line: str) -> None:
+    """Says nothing."""
 
 
 class Selector(Protocol):
@@ -76,8 +81,9 @@ def make_selector(
     columns: Columns | None = None,
     rng: np.random.Generator | None = None,
     category: str = "cylinder-clutter",
+    say: Callable[[str], None] = _silent,
 ) -> Selector:
-    """Returns a strategy, fitted to a library if it learns from one.
+    """Returns a strategy, fitted to a library if it learns from one; see `fit_model`.
 
     Args:
         method: See `method_names`.
@@ -85,13 +91,14 @@ def make_selector(
         columns: Columns of the experience library, if it learns from one.
         rng: Source of draws for RND; by default always the same ones.
         category: Clutter category, which says what LIC observes.
+        say: Receives a line before and after each fit.
 
     Raises:
         RequestError: The strategy is unknown or has no library to learn from.
     """
     parts = check_method(method)
     if len(parts) > 1:
-        first, later = (make_selector(part, arm, columns, rng, category) for part in parts)
+        first, later = (make_selector(part, arm, columns, rng, category, say) for part in parts)
         return FallbackSelector(first=first, later=later, method=method)
     if not needs_library(method):
         rng = np.random.default_rng(0) if rng is None else rng
@@ -102,21 +109,40 @@ def make_selector(
     if method not in estimator_names():
         estimator = method[:-1]
     elif features.second is not None:
-        second = fit_model(method, features.second, pair_reaches(columns))
-    return LicSelector(fit_model(estimator, features.first, columns), second, method=method)
+        second = fit_model(method, features.second, pair_reaches(columns), category, say)
+    first_model = fit_model(estimator, features.first, columns, category, say)
+    return LicSelector(first_model, second, method=method)
 
 
-def fit_model(estimator: str, features: FeatureMap, columns: Columns) -> SuccessModel:
+def fit_model(
+    estimator: str,
+    features: FeatureMap,
+    columns: Columns,
+    category: str = "any category",
+    say: Callable[[str], None] = _silent,
+) -> SuccessModel:
     """Returns an estimator fitted to a library D1, or to pairs D2 where features observe a reach.
 
     Its settings come from the simulated rows; those of other sources change the estimate, by their
-    weight, but no setting.
+    weight, but no setting. Settings are kept, see `lic_drake.estimate.kept`, and found again.
     """
+    from lic_drake.estimate.kept import keep_settings, kept_path, read_settings
+
     rows, fitted = features.rows(columns), make_estimator(estimator, features)
-    part = rows.simulated
+    path, part = kept_path(estimator, features, rows), rows.simulated
+    known = None if path is None else read_settings(path, fitted, rows.X.shape[1], say)
+    if known is not None:
+        fitted.set_params(**known).fit(rows.X, rows.y, sample_weight=rows.weight)
+        return SuccessModel(estimator=fitted, features=features)
+    kind = "pairs of reaches" if features.observed else "reaches"
+    say(f"fitting {estimator} on {len(rows.y)} {kind} of {category} ...")
+    began = time.perf_counter()
     if part.all() or not part.any():  # Without any simulated row all choose the settings.
         fitted.fit(rows.X, rows.y, rows.groups, rows.weight)
     else:
         fitted.fit(rows.X[part], rows.y[part], rows.groups[part], rows.weight[part])
         fitted = fitted.conditioned_on(rows.X, rows.y, rows.weight)
+    say(f"fitted {estimator} in {time.perf_counter() - began:.1f} s")
+    if path is not None:
+        keep_settings(path, fitted, say)
     return SuccessModel(estimator=fitted, features=features)

@@ -95,6 +95,7 @@ def choose_exhibits(
         library.columns(),
         np.random.default_rng(first_environment),
         scenario.category,
+        say=say,
     )
     wanted = {True: each, False: each}
     exhibits = []

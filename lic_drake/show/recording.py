@@ -1,23 +1,9 @@
 """Records reaches as one HTML file that plays offline, contact forces included."""
 
-import logging
 import math
 from pathlib import Path
 
 import numpy as np
-from pydrake.geometry import (
-    Cylinder,
-    Meshcat,
-    MeshcatParams,
-    MeshcatVisualizer,
-    MeshcatVisualizerParams,
-    Rgba,
-    Role,
-    Sphere,
-)
-from pydrake.math import RigidTransform
-from pydrake.multibody.meshcat import ContactVisualizer, ContactVisualizerParams
-from pydrake.systems.framework import DiagramBuilder
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import readable_errors
@@ -25,7 +11,7 @@ from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.trace import ReachTrace
 from lic_drake.show.approach import Approach
 from lic_drake.show.page import embed
-from lic_drake.show.stage import add_stage, place
+from lic_drake.show.stage import Screen, open_meshcat
 from lic_drake.types import Vector
 
 PAUSE_S = 1.0
@@ -45,11 +31,6 @@ ARM_RAD_PER_S = 1.2
 
 RETRACT_SPEED = 4.0
 """Playback speed of the arm's retraction, relative to the reach."""
-
-_FORCES = "/drake/contact_forces"
-_PLANE_VIEW = (np.array([-0.4, -0.3, 1.05]), np.array([0.45, 0.02, 0.0]))
-_SPACE_VIEW = (np.array([-0.45, -1.65, 1.65]), np.array([0.4, -0.15, 0.85]))
-_TASK_COLOR = Rgba(0.0, 0.7, 0.8, 0.9)
 
 
 class Recording:
@@ -77,29 +58,23 @@ class Recording:
         """
         self._scenario = scenario
         self._approach = Approach(scenario, instance) if approach else None
-        self._meshcat = _make_meshcat()
-        builder = DiagramBuilder()
-        self._scene = scene = add_stage(builder, scenario, instance, drake_models)
-        shown = MeshcatVisualizerParams(role=Role.kIllustration)
-        MeshcatVisualizer.AddToBuilder(builder, scene.scene_graph, self._meshcat, shown)
-        arrows = ContactVisualizerParams(newtons_per_meter=50.0, force_threshold=0.05, radius=0.003)
-        ContactVisualizer.AddToBuilder(builder, scene.plant, self._meshcat, arrows)
-        self._diagram = builder.Build()
-        self._context = self._diagram.CreateDefaultContext()
+        self._meshcat = open_meshcat(scenario.arm().is_planar)
+        self._screen = Screen(self._meshcat, scenario, instance, drake_models)
         self._frames_per_second = frame_rate(scenario.mpc.rate_hz)
         self._springs_back = instance.stems is not None
         self._clock_s = 0.0
         self._b0 = scenario.task.b0
-        initial = scene.plant.GetDefaultPositions(scene.arm)[3:]
-        self._q: Vector = initial if self._approach is None else self._approach.waiting
-        self._set_up_view()
+        self._q = self._screen.initial if self._approach is None else self._approach.waiting
+        self._meshcat.StartRecording(
+            TICKS_PER_FRAME * self._frames_per_second, set_visualizations_while_recording=False
+        )
         if approach:
             self._draw()
 
     def add_reach(self, trace: ReachTrace, p_WG: Vector) -> None:
         """Records a reach to a goal p_WG; the trace needs its states."""
-        self._draw_goal(p_WG)
-        self._show_forces(True)
+        self._screen.draw_goal(p_WG)
+        self._screen.show_forces(True, self._clock_s)
         self._b0 = trace.b0
         begin = self._clock_s
         for k in range(0, len(trace.states), self._sample_step()):
@@ -119,7 +94,7 @@ class Recording:
 
         Stems spring back with it, as they do once released.
         """
-        self._show_forces(False)
+        self._screen.show_forces(False, self._clock_s)  # Moves between reaches are not simulated.
         step = round(RETRACT_SPEED * self._sample_step())
         for k in [*range(len(trace.states) - 1, -1, -step), 0]:
             self._draw(trace, k, with_clutter=self._springs_back)
@@ -169,30 +144,7 @@ class Recording:
         if state is not None:
             self._q = state.q
         shown = state if with_clutter else None
-        place(self._scene, self._context, self._b0, self._q, shown)
-        self._context.SetTime(self._clock_s)
-        self._diagram.ForcedPublish(self._context)
-
-    def _show_forces(self, visible: bool) -> None:
-        """Shows or hides contact forces from now on; moves between reaches are not simulated."""
-        self._meshcat.SetProperty(_FORCES, "visible", visible, self._clock_s)
-
-    def _set_up_view(self) -> None:
-        for end in ("top_color", "bottom_color"):
-            self._meshcat.SetProperty("/Background/<object>", end, [0.97, 0.97, 0.98])
-        for hidden in ("/Grid", "/Axes"):
-            self._meshcat.SetProperty(hidden, "visible", False)
-        planar = self._scenario.arm().is_planar
-        self._meshcat.SetCameraPose(*(_PLANE_VIEW if planar else _SPACE_VIEW))
-        self._meshcat.StartRecording(
-            TICKS_PER_FRAME * self._frames_per_second, set_visualizations_while_recording=False
-        )
-
-    def _draw_goal(self, p_WG: Vector) -> None:
-        radius = self._scenario.stop.success_distance_m
-        for name, shape in (("goal", Sphere(radius)), ("pole", Cylinder(0.002, 0.3))):
-            self._meshcat.SetObject(f"/task/{name}", shape, _TASK_COLOR)
-            self._meshcat.SetTransform(f"/task/{name}", RigidTransform(p_WG))
+        self._screen.draw(self._b0, self._q, shown, self._clock_s)
 
 
 def frame_rate(control_rate_hz: float) -> float:
@@ -201,14 +153,3 @@ def frame_rate(control_rate_hz: float) -> float:
     while rate > MAX_FRAMES_PER_SECOND:
         rate /= 2.0
     return rate
-
-
-def _make_meshcat() -> Meshcat:
-    """Returns a Meshcat without logging the address of its live view."""
-    logger = logging.getLogger("drake")
-    level = logger.level
-    logger.setLevel(logging.WARNING)
-    try:
-        return Meshcat(MeshcatParams(show_stats_plot=False))
-    finally:
-        logger.setLevel(level)

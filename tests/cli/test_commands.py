@@ -100,6 +100,8 @@ WRONG = [
     ("demo --robot planar-arm --category sphere-aperture-clutter", "is for --robot pr2"),
     ("demo --visuals drake_models", "is for --robot pr2, not planar-arm; omit it"),
     ("demo --library {none}", "make one with: lic collect"),
+    ("explore jungle", "choose one of cylinder-aperture-clutter"),
+    ("replay jungle 0", "no experience library at jungle"),
     ("reach --scenario jungle", "shipped scenarios: "),
     ("reach --goal 5 0", "choose a nearer goal"),
     ("reach --goal nan 0", "finite"),

@@ -1,8 +1,17 @@
 """What a page looks like in a headless Chromium, and what it writes to the console."""
 
+import asyncio
+import base64
+import io
+import json
+import os
 import re
+import signal
 import subprocess
+import time
+import urllib.request
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.colors import rgb_to_hsv
@@ -29,6 +38,75 @@ def visit(
     result = subprocess.run(command, check=True, capture_output=True, text=True, timeout=120)
     console = re.findall(r':CONSOLE[:(]\d+[^"]*(".*)', result.stderr)
     return imread(picture)[:, :, :3], console
+
+
+_OPEN = """for (const button of document.querySelectorAll(".close-button"))
+  if (button.textContent === "Open Controls") button.click();"""
+_MOVE = """(([name, value]) => {
+  for (const row of document.querySelectorAll("li.cr"))
+    if (row.querySelector(".property-name")?.textContent === name) {
+      const input = row.querySelector("input");
+      input.value = value;
+      input.dispatchEvent(new Event("change"));
+      input.dispatchEvent(new Event("blur"));
+      return true;
+    }
+  return false;
+})"""
+
+
+def move_slider(
+    chromium: str, address: str, tmp_path: Path, name: str, value: float, settle_s: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Opens a live Meshcat and moves a slider in its controls, by the DevTools protocol.
+
+    Returns:
+        The pictures before and after it, each `settle_s` seconds later, shape (height, width, 3).
+    """
+    from tornado.websocket import websocket_connect
+
+    async def drive(url: str) -> tuple[np.ndarray, np.ndarray]:
+        socket = await websocket_connect(url, max_message_size=2**26)
+
+        async def call(method: str, **params: Any) -> Any:
+            await socket.write_message(json.dumps({"id": 1, "method": method, "params": params}))
+            while True:
+                answer = json.loads(await socket.read_message() or "{}")
+                if answer.get("id") == 1:
+                    return answer["result"]
+
+        async def look() -> np.ndarray:
+            await asyncio.sleep(settle_s)
+            await call("Runtime.evaluate", expression=_OPEN)
+            data = (await call("Page.captureScreenshot"))["data"]
+            return imread(io.BytesIO(base64.b64decode(data)))[:, :, :3]
+
+        before = await look()
+        script = f"{_MOVE}({json.dumps([name, str(value)])})"
+        moved = await call("Runtime.evaluate", expression=script)
+        assert moved["result"]["value"], f"no slider {name!r}"
+        return before, await look()
+
+    profile = tmp_path / "profile"
+    command = [
+        *(chromium, "--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader"),
+        *("--enable-unsafe-swiftshader", "--remote-debugging-port=0", "--window-size=1000,700"),
+        *(f"--user-data-dir={profile}", address),
+    ]
+    browser = subprocess.Popen(command, stderr=subprocess.DEVNULL, start_new_session=True)
+    try:
+        ready, ends = profile / "DevToolsActivePort", time.monotonic() + 60.0
+        while not (ready.exists() and ready.read_text()):
+            assert time.monotonic() < ends, "the browser did not start"
+            time.sleep(0.1)
+        port = ready.read_text().split()[0]
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/json") as answer:
+            pages = json.load(answer)
+        (page,) = (page for page in pages if page["type"] == "page")
+        return asyncio.run(drive(page["webSocketDebuggerUrl"]))
+    finally:
+        os.killpg(browser.pid, signal.SIGKILL)
+        browser.wait()
 
 
 def hue_share(image: np.ndarray, low: float, high: float) -> float:
