@@ -89,11 +89,25 @@ def test_a_row_is_replayed_until_ctrl_c(brief: str) -> None:
         assert re.fullmatch(r"http://localhost:7\d\d\d", address)
 
 
+def test_quick_imports_only_postpone() -> None:
+    program = """
+import sys
+from lic_drake.cli.arguments import quick_imports
+with quick_imports():
+    import lic_drake.estimate.kept
+assert "scipy.stats._stats_py" not in sys.modules
+import scipy.stats
+from scipy.stats import norm
+assert scipy.stats.norm.cdf(0.0) == norm.cdf(0.0) == 0.5
+"""
+    subprocess.run([sys.executable, "-c", program], check=True)
+
+
 @pytest.mark.slow
 @pytest.mark.browser
 def test_a_slider_in_a_browser_moves_the_picture(tmp_path: Path, chromium: str) -> None:
     with showing("explore", "--method", "knn1") as address:
-        before, after = move_slider(chromium, address, tmp_path, "goal y [m]", -0.3, settle_s=8.0)
+        before, after = move_slider(chromium, address, tmp_path, "goal y [m]", -0.3)
     assert_shows_a_scene(before)
     assert_shows_a_scene(after)
     assert np.mean(np.abs(after - before).max(axis=2) > 0.1) > 2e-3

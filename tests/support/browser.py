@@ -10,6 +10,7 @@ import signal
 import subprocess
 import time
 import urllib.request
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +41,11 @@ def visit(
     return imread(picture)[:, :, :3], console
 
 
+def _left(image: np.ndarray) -> np.ndarray:
+    """Returns the part of a picture that the controls do not cover."""
+    return image[:, : image.shape[1] * 7 // 10]
+
+
 _OPEN = """for (const button of document.querySelectorAll(".close-button"))
   if (button.textContent === "Open Controls") button.click();"""
 _MOVE = """(([name, value]) => {
@@ -56,12 +62,13 @@ _MOVE = """(([name, value]) => {
 
 
 def move_slider(
-    chromium: str, address: str, tmp_path: Path, name: str, value: float, settle_s: float
+    chromium: str, address: str, tmp_path: Path, name: str, value: float, patience_s: float = 120.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Opens a live Meshcat and moves a slider in its controls, by the DevTools protocol.
 
     Returns:
-        The pictures before and after it, each `settle_s` seconds later, shape (height, width, 3).
+        The pictures before and after it, shape (height, width, 3): the first that shows a scene,
+        and the first that differs from it, or the last ones if `patience_s` seconds pass.
     """
     from tornado.websocket import websocket_connect
 
@@ -75,17 +82,21 @@ def move_slider(
                 if answer.get("id") == 1:
                     return answer["result"]
 
-        async def look() -> np.ndarray:
-            await asyncio.sleep(settle_s)
-            await call("Runtime.evaluate", expression=_OPEN)
-            data = (await call("Page.captureScreenshot"))["data"]
-            return imread(io.BytesIO(base64.b64decode(data)))[:, :, :3]
+        async def look(is_awaited: Callable[[np.ndarray], bool]) -> np.ndarray:
+            ends = time.monotonic() + patience_s
+            while True:
+                await asyncio.sleep(1.0)
+                await call("Runtime.evaluate", expression=_OPEN)
+                data = (await call("Page.captureScreenshot"))["data"]
+                image: np.ndarray = imread(io.BytesIO(base64.b64decode(data)))[:, :, :3]
+                if is_awaited(image) or time.monotonic() > ends:
+                    return image
 
-        before = await look()
+        before = await look(lambda image: _left(image).std() > 0.05)
         script = f"{_MOVE}({json.dumps([name, str(value)])})"
         moved = await call("Runtime.evaluate", expression=script)
         assert moved["result"]["value"], f"no slider {name!r}"
-        return before, await look()
+        return before, await look(lambda image: bool(np.any(_left(image) != _left(before))))
 
     profile = tmp_path / "profile"
     command = [
