@@ -123,7 +123,7 @@ def test_failures_and_invalid_starts_leave_nothing(
 
 def test_a_recording_is_freed() -> None:
     recorded = Recording(free_space(0.2), make_clutter(cylinder(0.5, 0.3, movable=True)))
-    diagram = weakref.ref(recorded._diagram)
+    diagram = weakref.ref(recorded._screen._diagram)
     del recorded
     gc.collect()
     assert diagram() is None

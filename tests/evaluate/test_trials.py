@@ -82,7 +82,7 @@ def test_trials_that_cannot_be_compared_are_refused() -> None:
     table = TrialTable(make_rows("gp", ["1", "01", "0"]))
     with pytest.raises(LibraryError, match="gp made 1 of 2 attempts at goal 0 of environment 2"):
         table.success("gp", 2)
-    with pytest.raises(LibraryError, match=r"no trials of knn; there are rnd, gp \(fresh\)"):
+    with pytest.raises(LibraryError, match=r"no trials of knn; there are rnd, gp \(other\)"):
         TrialTable(ROWS).trials("knn")
 
 

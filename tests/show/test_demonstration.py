@@ -122,7 +122,7 @@ def test_a_pr2_shows_what_it_did_in_drakes_meshes(
     assert [first.record, second.record] == [run_reach(a.request) for a in (first, second)]
     assert second.request.after == (first.request.start,)
     assert lines[0].startswith("sphere-aperture-clutter, evaluation environment 3: goal at (0.840,")
-    assert re.search(r"starts at the aperture at \(0.530,.*torso at", lines[1])
+    assert any(re.search(r"starts at the aperture at \(0.530,.*torso at", line) for line in lines)
 
 
 @pytest.mark.usefixtures("_renderer", "_coarse")
