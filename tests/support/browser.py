@@ -92,7 +92,8 @@ def move_slider(
                 if is_awaited(image) or time.monotonic() > ends:
                     return image
 
-        before = await look(lambda image: _left(image).std() > 0.05)
+        # Objects arrive one after the other.
+        before = await look(lambda image: hue_share(image, 0, 50) > 2e-3)
         script = f"{_MOVE}({json.dumps([name, str(value)])})"
         moved = await call("Runtime.evaluate", expression=script)
         assert moved["result"]["value"], f"no slider {name!r}"
