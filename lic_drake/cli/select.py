@@ -85,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
     reliability = read_reliability(library.path, args.method, attempt)
     if reliability is None and args.least is not None:
         raise LicError(
-            f"{library.path} has no {FEWEST} choices of {args.method} for attempt {attempt}, so that"
+            f"{library.path} has no {FEWEST} choices of {args.method} for attempt {attempt}, so"
             " no probability is known; make some as `lic select --help` says, or omit --least"
         )
     chosen = selector.select(Situation(p_WG=p_WG, starts=starts, failed=failed))
