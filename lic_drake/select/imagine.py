@@ -8,6 +8,7 @@ agree with that, and the starts that seem best are simulated in them, fewer and 
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import cache
 from itertools import count, islice
 
 import numpy as np
@@ -61,16 +62,19 @@ class ImaginingSelector:
         if not situation.failed:
             return replace(self._lic.select(situation), method=self.method)
         requests = requests_of(situation)
-        environments = imagined_environments(requests)
         starts, estimates = self._candidates(situation)
         scenario, diagrams = requests[-1].scenario, default_session(True).diagrams
 
-        def reaches(environment: ClutterInstance, k: int) -> bool:
-            start = starts[k]
-            world = Environment(scenario, environment, b0=start.b0, cache=diagrams)
-            return world.reach(situation.p_WG, start.x0, q=start.q).outcome == "reached"
+        def world(instance: ClutterInstance) -> Callable[..., Environment]:
+            """Returns the environment as bases find it."""
+            return cache(lambda *b0: Environment(scenario, instance, True, np.array(b0), diagrams))
 
-        best, share = race(estimates, environments, reaches)
+        def reaches(world: Callable[..., Environment], k: int) -> bool:
+            start = starts[k]
+            result = world(*start.b0.tolist()).reach(situation.p_WG, start.x0, q=start.q)
+            return result.outcome == "reached"
+
+        best, share = race(estimates, map(world, imagined_environments(requests)), reaches)
         return Selection(starts[best], share, self.method, time.perf_counter() - began)
 
     def _candidates(self, situation: Situation) -> tuple[list[Start], Vector]:
