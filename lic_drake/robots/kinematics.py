@@ -4,7 +4,7 @@ Frame R is the arm's base frame, which b0 carries; frame E is the tip, which poi
 pose x0 is (x, y, phi) for an arm in the plane, else position and quaternion (w, x, y, z) of E.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -13,25 +13,17 @@ from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RotationMatrix
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, JacobianWrtVariable
-from scipy.spatial.transform import Rotation
 
+from lic_drake.robots.chain import Chain
 from lic_drake.types import BoolVector, Vector
 
 if TYPE_CHECKING:
     from lic_drake.robots.arm import Arm
 
-IK_TOLERANCE = 1e-10
-"""Largest error of a numerical inverse kinematics solution, metres and radians."""
-
 LIMIT_TOLERANCE = 1e-9
 """Joint angles this far beyond a limit, radians, are taken for rounding."""
 
-_MAX_NEWTON_STEPS = 40
-_LARGEST_STEP = 0.5
-_DAMPING = 1e-8
 _NUM_SEEDS = 32
-_DISTINCT_RAD = 1e-5
-
 
 _PERMUTATION = np.array(
     [
@@ -93,7 +85,7 @@ class Kinematics:
     ) -> None:
         self.is_planar = arm.is_planar
         self.q_min, self.q_max = arm.q_min, arm.q_max
-        self._plant, self._links, self._tip = plant, links, tip
+        self._arm, self._plant, self._links, self._tip = arm, plant, links, tip
         self._context = plant.CreateDefaultContext()
 
     def calc_pose(self, q: Vector) -> ArmPose:
@@ -134,25 +126,23 @@ class Kinematics:
         A redundant arm has infinitely many, of which this is a sample: those of lowest preselection
         cost first or, with `near`, the nearest first. A quaternion may have any positive norm.
         """
-        p_RE, R_RE = rigid_pose(x0)
-
-        def missing(pose: ArmPose) -> tuple[Vector, Vector]:
-            turn = Rotation.from_matrix(R_RE @ pose.R_RE.T).as_rotvec()
-            error, J = np.append(p_RE - pose.p_RE, turn), np.vstack([pose.Jv_E, pose.Jw_E])
-            rows = [0, 1, 5] if self.is_planar else slice(None)
-            return error[rows], J[rows]
-
-        if near is not None:
-            found = self._newton(missing, [near, *(0.5 * (near + self._seeds[:8]))])
-            return found[np.argsort(np.linalg.norm(found - near, axis=1), kind="stable")]
-        return self._cheapest_first(self._newton(missing, self._seeds))
+        missing = self.chain.to_pose(*rigid_pose(x0), [0, 1, 5] if self.is_planar else [*range(6)])
+        if near is None:
+            return self._cheapest_first(*self.chain.solve(missing, self._seeds))
+        found, _ = self.chain.newton(missing, np.vstack([near, 0.5 * (near + self._seeds[:8])]))
+        return found[np.argsort(np.linalg.norm(found - near, axis=1), kind="stable")]
 
     def solve_pointing(self, p_RE: Vector, u_R: Vector) -> list[Vector]:
         """Returns configurations with the tip at each of k places, pointing along u_R.
 
         For each place those within the limits, shape (n, m), lowest preselection cost first.
         """
-        return [self._point(p, u_R) for p in p_RE]
+        if self.is_planar:
+            phi = np.arctan2(u_R[1], u_R[0])
+            return [self.solve_ik(np.array([*p[:2], phi])) for p in p_RE]
+        missing = self.chain.to_pointing(p_RE, u_R)
+        found = self.chain.solve(missing, self._seeds, len(p_RE))
+        return [self._cheapest_first(q) for q in found]
 
     def calc_preselection_cost(self, q: Vector) -> Vector:
         """Returns the cost of Eq. (5) of configurations, shape (n, m), as shape (n,), 1/m.
@@ -160,26 +150,7 @@ class Kinematics:
         C = 1 / (|x'p_tw| + |x'p_te|) with p_tw and p_te from the tool to wrist and elbow, here the
         origins of the last and the middle link: low where hand and forearm point into the clutter.
         """
-        behind = np.empty(len(q))
-        for i, row in enumerate(q):
-            pose = self.calc_pose(row)
-            wrist, elbow = pose.p_RL[-1], pose.p_RL[len(pose.p_RL) // 2]
-            behind[i] = abs(pose.p_RE[0] - wrist[0]) + abs(pose.p_RE[0] - elbow[0])
-        return 1.0 / np.maximum(behind, 1e-9)
-
-    def _point(self, p_RE: Vector, u_R: Vector) -> Vector:
-        if self.is_planar:
-            return self.solve_ik(np.array([p_RE[0], p_RE[1], np.arctan2(u_R[1], u_R[0])]))
-
-        def missing(pose: ArmPose) -> tuple[Vector, Vector]:
-            u = pose.R_RE[:, 0]
-            axis, cos = np.cross(u, u_R), float(u @ u_R)
-            sin = float(np.linalg.norm(axis))
-            turn = np.arctan2(sin, cos) * axis / max(sin, 1e-12) + (cos < -0.999) * pose.R_RE[:, 2]
-            across = pose.Jw_E - np.outer(u, u @ pose.Jw_E)
-            return np.append(p_RE - pose.p_RE, turn), np.vstack([pose.Jv_E, across])
-
-        return self._cheapest_first(self._newton(missing, self._seeds))
+        return 1.0 / np.maximum(self.chain.calc_pose(q).behind, 1e-9)
 
     def _cheapest_first(self, q: Vector) -> Vector:
         return q[np.argsort(self.calc_preselection_cost(q), kind="stable")]
@@ -189,25 +160,19 @@ class Kinematics:
         shape = (_NUM_SEEDS, len(self.q_min))
         return np.random.default_rng(0).uniform(self.q_min, self.q_max, shape)
 
-    def _newton(
-        self, missing: Callable[[ArmPose], tuple[Vector, Vector]], seeds: Sequence[Vector] | Vector
-    ) -> Vector:
-        """Returns the distinct solutions that damped Newton steps within the limits come to.
-
-        `missing` gives the error that is left at a pose, and its Jacobian.
-        """
-        found: list[Vector] = []
-        for q in seeds:
-            for _ in range(_MAX_NEWTON_STEPS):
-                error, J = missing(self.calc_pose(q))
-                if np.abs(error).max() < IK_TOLERANCE:
-                    if all(np.abs(q - other).max() > _DISTINCT_RAD for other in found):
-                        found.append(q)
-                    break
-                step = J.T @ np.linalg.solve(J @ J.T + _DAMPING * np.eye(len(J)), error)
-                step *= min(1.0, _LARGEST_STEP / max(np.abs(step).max(), 1e-12))
-                q = np.clip(q + step, self.q_min, self.q_max)
-        return np.array(found).reshape(-1, len(self.q_min))
+    @cached_property
+    def chain(self) -> Chain:
+        """The arm for many configurations at once."""
+        pose, arm = self.calc_pose(np.zeros(len(self.q_min))), self._arm
+        marks = (len(pose.p_RL) - 1, len(pose.p_RL) // 2)
+        return Chain(
+            axes=pose.Jw_E.T,
+            p_RJ=arm.p_RJ,
+            R_RE=pose.R_RE,
+            marks=tuple((arm.num_moving(link), pose.p_RL[link]) for link in marks),
+            q_min=self.q_min,
+            q_max=self.q_max,
+        )
 
 
 def frozen(pose: ArmPose) -> ArmPose:
