@@ -19,6 +19,11 @@ def scenarios_dir() -> Path:
     return models_dir() / "scenarios"
 
 
+def robots_dir() -> Path:
+    """Returns the folder of robot files."""
+    return models_dir() / "robots"
+
+
 def shipped_library(category: str) -> Path:
     """Returns the folder of the experience library shipped for a category."""
     return models_dir() / "experience" / category

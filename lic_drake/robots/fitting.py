@@ -1,0 +1,184 @@
+"""`Fitting`: what a robot file changes in a model before it becomes an arm."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+from xml.etree import ElementTree
+
+import numpy as np
+from pydrake.geometry import Capsule, Cylinder
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
+from pydrake.multibody.tree import FixedOffsetFrame, Joint, JointActuator, ModelInstanceIndex, PdControllerGains
+
+from lic_drake.errors import ScenarioError
+from lic_drake.types import Vector
+
+_DRAKE = "{http://drake.mit.edu}"
+_SKIN_COLOR = np.array([0.66, 0.67, 0.69, 1.0])
+_PEDESTAL_COLOR = np.array([0.35, 0.35, 0.38, 1.0])
+_PEDESTAL_RADIUS_M = 0.09
+
+type Place = tuple[str, Sequence[float], Sequence[float]]
+"""A frame, and xyz, metres, and roll, pitch and yaw, degrees."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fitting:
+    """What is added to a parsed model.
+
+    Attributes:
+        base: The frame that stands still, and where it is in R.
+        tip: The frame of the hand, and where E is in it.
+        capsules: Link, ends of the axis in the link's frame and radius, metres.
+        gains: Stiffness, Nm/rad, and damping, Nms/rad, by joint.
+        limits_deg: Lower and upper limits, degrees, None as in the model, by joint.
+        ignored_contacts: Pairs of links that may touch.
+        pedestal_m: Length of the column under the base, metres; 0: none.
+    """
+
+    BASE: ClassVar[str] = "fitted_base"
+    TIP: ClassVar[str] = "fitted_tip"
+
+    base: Place
+    tip: Place
+    capsules: Sequence[tuple[str, Sequence[Sequence[float]], float]]
+    gains: Mapping[str, tuple[float, float]]
+    limits_deg: Mapping[str, tuple[float | None, float | None]]
+    ignored_contacts: Sequence[Sequence[str]]
+    pedestal_m: float
+
+    def read_model(self, path: Path) -> Path | str:
+        """Returns the model, as text where its shapes or what they may touch are changed.
+
+        Raises:
+            ScenarioError: It is not XML.
+        """
+        links = {link for link, _, _ in self.capsules}
+        if not links and not self.ignored_contacts:
+            return path
+        try:
+            root = ElementTree.parse(path).getroot()
+        except ElementTree.ParseError as error:
+            raise ScenarioError(f"model: {path} is not XML: {error}") from None
+        ElementTree.register_namespace("drake", _DRAKE[1:-1])
+        for link in root.iter("link"):
+            for shape in link.findall("collision") if link.get("name") in links else ():
+                link.remove(shape)
+        model = root.find("model")
+        for i, pair in enumerate(self.ignored_contacts):
+            (root if model is None else model).append(_ignored(f"ignored{i}", pair))
+        # Text has no folder: what it names must not be relative.
+        for part in root.iter():
+            name = part.get("filename")
+            if name is not None:
+                part.set("filename", _absolute(name, path.parent))
+            if part.tag == "uri" and part.text:
+                part.text = _absolute(part.text.strip(), path.parent)
+        return ElementTree.tostring(root, encoding="unicode")
+
+    def apply(self, plant: MultibodyPlant, arm: ModelInstanceIndex) -> None:
+        """Changes a parsed model; a ScenarioError names the key whose value does not fit."""
+        self._add_frames(plant, arm)
+        actuators = _actuators(plant, arm)
+        for name, (stiffness, damping) in self.gains.items():
+            joint = _joint(plant, arm, name)
+            if name not in actuators:
+                actuators[name] = plant.AddJointActuator(name, joint)
+            actuators[name].set_controller_gains(PdControllerGains(p=stiffness, d=damping))
+        for name, limits in self.limits_deg.items():
+            joint = _joint(plant, arm, name)
+            low, high = joint.position_lower_limits(), joint.position_upper_limits()
+            if limits[0] is not None:
+                low = np.maximum(low, math.radians(limits[0]))
+            if limits[1] is not None:
+                high = np.minimum(high, math.radians(limits[1]))
+            if np.any(low > high):
+                raise ScenarioError(f"joints: {name}: no position is within limits of {limits}")
+            joint.set_position_limits(low, high)
+        for pair in self.ignored_contacts:
+            for name in pair:
+                _check_link(plant, arm, name, "ignored_contacts")
+        for link, _, _ in self.capsules:
+            _check_link(plant, arm, link, "capsules")
+        if plant.geometry_source_is_registered():
+            self._add_shapes(plant, arm)
+
+    def _add_frames(self, plant: MultibodyPlant, arm: ModelInstanceIndex) -> None:
+        for key, name, (frame, xyz, rpy_deg) in (
+            ("base", self.BASE, self.base),
+            ("tip", self.TIP, self.tip),
+        ):
+            if not plant.HasFrameNamed(frame, arm):
+                frames = [plant.get_frame(i).name() for i in plant.GetFrameIndices(arm)]
+                raise ScenarioError(
+                    f"{key}: frame {frame!r} is not in the model; it has"
+                    f" {', '.join(filter(None, frames))}"
+                )
+            X = RigidTransform(RollPitchYaw(np.deg2rad(rpy_deg)), np.array(xyz))
+            X = X.inverse() if key == "base" else X
+            plant.AddFrame(FixedOffsetFrame(name, plant.GetFrameByName(frame, arm), X, arm))
+
+    def _add_shapes(self, plant: MultibodyPlant, arm: ModelInstanceIndex) -> None:
+        """Adds the skin and the pedestal; the scene gives the skin its contact properties."""
+        friction = CoulombFriction(0.0, 0.0)
+        for i, (link, ends, radius) in enumerate(self.capsules):
+            body = plant.GetBodyByName(link, arm)
+            first, last = np.array(ends)
+            X_LS, shape = _along(last - first), Capsule(radius, math.dist(first, last))
+            X_LS.set_translation(0.5 * (first + last))
+            name = f"{link}_skin{i}"
+            plant.RegisterCollisionGeometry(body, X_LS, shape, name, friction)
+            plant.RegisterVisualGeometry(body, X_LS, shape, name, _SKIN_COLOR)
+        if self.pedestal_m > 0.0:
+            frame = plant.GetFrameByName(self.base[0], arm)
+            X_BP = RigidTransform(np.array([0.0, 0.0, -0.5 * self.pedestal_m]))
+            column = Cylinder(_PEDESTAL_RADIUS_M, self.pedestal_m)
+            X_LP = frame.GetFixedPoseInBodyFrame() @ X_BP
+            body = frame.body()
+            plant.RegisterCollisionGeometry(body, X_LP, column, "pedestal", friction)
+            plant.RegisterVisualGeometry(body, X_LP, column, "pedestal", _PEDESTAL_COLOR)
+
+
+def _actuators(plant: MultibodyPlant, arm: ModelInstanceIndex) -> dict[str, JointActuator]:
+    """Returns the actuators of an arm, by joint; those of one instance are only known later."""
+    every = map(plant.get_joint_actuator, plant.GetJointActuatorIndices())
+    return {a.joint().name(): a for a in every if a.model_instance() == arm}
+
+
+def _joint(plant: MultibodyPlant, arm: ModelInstanceIndex, name: str) -> Joint:
+    """Returns a joint; a ScenarioError if there is none."""
+    if not plant.HasJointNamed(name, arm):
+        joints = [plant.get_joint(i) for i in plant.GetJointIndices(arm)]
+        moving = [joint.name() for joint in joints if joint.num_positions()]
+        raise ScenarioError(f"joints: {name!r} is not in the model; it has {', '.join(moving)}")
+    return plant.GetJointByName(name, arm)
+
+
+def _check_link(plant: MultibodyPlant, arm: ModelInstanceIndex, name: str, key: str) -> None:
+    if not plant.HasBodyNamed(name, arm):
+        links = [plant.get_body(i).name() for i in plant.GetBodyIndices(arm)]
+        raise ScenarioError(f"{key}: link {name!r} is not in the model; it has {', '.join(links)}")
+
+
+def _along(axis: Vector) -> RigidTransform:
+    """Returns a rotation that lays Sz along an axis, which may be 0: then none."""
+    if not np.any(axis):
+        return RigidTransform()
+    return RigidTransform(RotationMatrix.MakeFromOneVector(axis, 2), np.zeros(3))
+
+
+def _ignored(name: str, links: Sequence[str]) -> ElementTree.Element:
+    """Returns a group of links that may touch, in the words of URDF (attributes) and SDF (text)."""
+    group = ElementTree.Element(f"{_DRAKE}collision_filter_group", name=name)
+    for link in links:
+        ElementTree.SubElement(group, f"{_DRAKE}member", link=link).text = link
+    ignored = f"{_DRAKE}ignored_collision_filter_group"
+    ElementTree.SubElement(group, ignored, name=name).text = name
+    return group
+
+
+def _absolute(name: str, folder: Path) -> str:
+    return name if "://" in name else str((folder / name).resolve())
