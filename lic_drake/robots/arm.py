@@ -61,6 +61,7 @@ class Arm:
     Attributes:
         link_names: Names of the bodies that carry skin.
         skin: Their collision shapes.
+        joint_names: Names of the m joints.
         q_home: The posture, within the limits, shape (m,), radians.
         stiffness: Joint stiffness of the impedance controller, shape (m,), Nm/rad.
         damping: Its joint damping, shape (m,), Nms/rad.
@@ -245,6 +246,7 @@ class Arm:
             raise ValueError(
                 f"it has {len(joints)} revolute joints and {plant.num_positions()} positions"
             )
+        self.joint_names = tuple(joint.name() for joint in joints)
         low, high = plant.GetPositionLowerLimits().copy(), plant.GetPositionUpperLimits().copy()
         self.q_min = low if limits[0] is None else np.maximum(low, limits[0])
         self.q_max = high if limits[1] is None else np.minimum(high, limits[1])

@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import cast
 
 import numpy as np
-from pydrake.geometry import CollisionFilterDeclaration, GeometrySet, QueryObject
+from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet, QueryObject
 from pydrake.systems.framework import Context, DiagramBuilder
 
 from lic_drake.clutter.instance import ClutterInstance
@@ -54,6 +54,20 @@ class CollisionChecker:
         positions = self._arm.positions(b0, q)
         self.plant.SetPositions(self.plant_context, self._scene.arm, positions)
         return is_touching(self._scene, self._root)
+
+    def touching_links(self, b0: Vector, q: Vector) -> list[str]:
+        """Returns the pairs of links or objects that touch, as `touches` says, in words."""
+        if not self.touches(b0, q):
+            return []
+        context = self._scene.scene_graph.GetMyContextFromRoot(self._root)
+        query = cast(QueryObject, self._scene.scene_graph.get_query_output_port().Eval(context))
+        inspector = query.inspector()
+
+        def link(geometry: GeometryId) -> str:
+            return inspector.GetName(inspector.GetFrameId(geometry)).split("::")[-1]
+
+        pairs = query.ComputePointPairPenetration()
+        return sorted({f"{link(pair.id_A)} and {link(pair.id_B)}" for pair in pairs})
 
     def first_free(self, b0: Vector, angles: Vector) -> Vector | None:
         """Returns the first collision-free joint angles of `angles`, shape (n, m)."""

@@ -1,0 +1,167 @@
+"""`check_robot`: what a robot is, and whether it reaches a free goal and presses with the threshold.
+
+Both reaches go through the diagram that all others use, in a scene of their own.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lic_drake.clutter.instance import ClutterInstance, join, make_objects
+from lic_drake.control.taxels import make_taxels
+from lic_drake.errors import ScenarioError
+from lic_drake.reach.environment import Environment
+from lic_drake.reach.scenario import Scenario, load_scenario
+from lic_drake.reach.trace import ReachResult
+from lic_drake.robots.arm import Arm
+from lic_drake.robots.registry import get_robot
+from lic_drake.scene.collision import CollisionChecker
+from lic_drake.types import Vector
+
+GOAL_DISTANCE_M = (0.15, 0.35)
+"""Least and largest distance of the free goal from the tip at home."""
+
+GOAL_TURN_RAD = 0.6
+"""By how much each joint may differ from home at the free goal."""
+
+WALL_GAP_M = 0.01
+"""Distance of the wall from the tip at home."""
+
+BEHIND_WALL_M = 0.15
+"""Distance of the goal that makes the arm press on the wall, behind the tip at home."""
+
+PRESS_S = 10.0
+"""Simulated time of pressing; the force has settled in the last quarter."""
+
+TOLERANCE = 0.2
+"""Largest deviation of the settled force from the threshold, as a share of it."""
+
+_WALL_M = (0.05, 0.5, 0.5)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotCheck:
+    """What `check_robot` found.
+
+    Attributes:
+        scenario: The scenario of both reaches.
+        free: The reach to a free goal, p_WG, shape (3,), metres.
+        wall: What the second one presses on, and its goal, p_WG.
+        pressing: The second reach, with its states.
+    """
+
+    scenario: Scenario
+    p_WG: Vector
+    free: ReachResult
+    wall: ClutterInstance
+    pressing: ReachResult
+
+    @property
+    def settled_N(self) -> Vector:
+        """Largest taxel force of each sample in the last quarter of pressing, N."""
+        forces = np.array(self.pressing.trace.peak_force)
+        return forces[3 * len(forces) // 4 :]
+
+    @property
+    def reaches(self) -> bool:
+        """Whether the arm came to the free goal."""
+        return self.free.outcome == "reached"
+
+    @property
+    def settles(self) -> bool:
+        """Whether the force settled at the threshold."""
+        threshold = self.scenario.mpc.force_threshold_N
+        off = np.abs(self.settled_N - threshold) / threshold
+        return bool(len(off) and off.max() <= TOLERANCE)
+
+    def values(self) -> dict[str, Any]:
+        """Returns all that is worth printing, in plain types."""
+        arm, trace = self.scenario.arm(), self.pressing.trace
+        layout = make_taxels(arm, self.scenario.scene.taxels_per_m)
+        found: dict[str, Any] = {"robot": arm.name, "joints": arm.num_joints}
+        rows = (np.rad2deg(arm.q_min), np.rad2deg(arm.q_max), arm.stiffness, arm.damping)
+        for name, row in zip(arm.joint_names, np.transpose(rows).tolist(), strict=True):
+            keys = ("lower_deg", "upper_deg", "stiffness_Nm_per_rad", "damping_Nms_per_rad")
+            found[name] = dict(zip(keys, row, strict=True))
+        distances = np.linalg.norm(np.reshape(self.free.trace.p_WE, (-1, 3)) - self.p_WG, axis=1)
+        step = max(1, round(0.5 * self.scenario.mpc.rate_hz))
+        pressing = zip(trace.time_s[::step], trace.peak_force[::step], strict=True)
+        return found | {
+            "reach_m": arm.reach_m,
+            "height_range_m": list(arm.height_range_m),
+            "skin_links": list(arm.link_names),
+            "taxels": layout.num_taxels,
+            "skin_area_m2": layout.num_taxels * layout.pitch_m**2,
+            "free_goal": self.free.outcome,
+            "free_goal_distance_m": float(distances.min(initial=np.inf)),
+            "free_goal_time_s": self.free.trace.time_s[-1] if self.free.trace.time_s else 0.0,
+            "threshold_N": self.scenario.mpc.force_threshold_N,
+            "force_N": {f"{time:.1f} s": round(force, 2) for time, force in pressing},
+            "settled_N": [float(np.min(self.settled_N)), float(np.max(self.settled_N))],
+            "reaches": self.reaches,
+            "settles": self.settles,
+        }
+
+
+def check_robot(name: str) -> RobotCheck:
+    """Checks a robot, given by its name or file.
+
+    Raises:
+        ScenarioError: It cannot be read, or touches itself at home.
+    """
+    arm = get_robot(name)
+    low, high = np.nan_to_num(arm.height_range_m, neginf=0.0, posinf=0.0)
+    shipped = "cylinder-clutter" if arm.is_planar else "sphere-aperture-clutter"
+    stop = "{stuck_distance_m: 0.0, progress_m: 0.0, force_limit_N: .inf}"
+    task = f"{{torso_m: {0.5 * (low + high)}, stand: null}}"
+    scenario = load_scenario(shipped, f"{{robot: {name!r}, task: {task}, stop: {stop}}}")
+    b0 = scenario.task.b0
+    touching = CollisionChecker(arm, join(), scenario.scene).touching_links(b0, arm.q_home)
+    if touching:
+        raise ScenarioError(
+            f"{arm.name} touches itself in its home posture: {', '.join(touching)}; give another"
+            " home_deg or, where it must be so, ignored_contacts"
+        )
+    p_WG = _free_goal(arm) + b0
+    x0 = arm.tip_pose(arm.q_home)
+    axes = 2 if arm.is_planar else 3
+    x0[:axes] += b0[:axes]
+    free = Environment(scenario, join(), sleep=False).reach(p_WG, x0, q=arm.q_home)
+    wall = _wall(arm, b0)
+    scenario.stop.timeout_s = PRESS_S
+    pressing = Environment(scenario, wall, sleep=False).reach(
+        np.asarray(wall.p_WG), x0, keep_states=True, q=arm.q_home
+    )
+    return RobotCheck(scenario=scenario, p_WG=p_WG, free=free, wall=wall, pressing=pressing)
+
+
+def _free_goal(arm: Arm) -> Vector:
+    """Returns the foremost place that the tip comes to near its home posture, in R, metres."""
+    rng = np.random.default_rng(0)
+    turns = rng.uniform(-GOAL_TURN_RAD, GOAL_TURN_RAD, (200, arm.num_joints))
+    home = arm.calc_pose(arm.q_home).p_RE
+    q = np.clip(arm.q_home + turns, arm.q_min, arm.q_max)
+    places = np.array([arm.calc_pose(row).p_RE for row in q])
+    distance = np.linalg.norm(places - home, axis=1)
+    near = (distance > GOAL_DISTANCE_M[0]) & (distance < GOAL_DISTANCE_M[1])
+    places = places[near] if np.any(near) else places
+    foremost: Vector = places[np.argmax(places[:, 0])]
+    return foremost
+
+
+def _wall(arm: Arm, b0: Vector) -> ClutterInstance:
+    """Returns an upright wall before the hand at home, or a table under it, with the goal behind.
+
+    The wall is across the hand's direction.
+    """
+    pose = arm.calc_pose(arm.q_home)
+    along = pose.R_RE[:, 0]
+    upright = np.hypot(along[0], along[1]) > abs(along[2])
+    axis = along * [1.0, 1.0, 0.0] if upright else along * [0.0, 0.0, 1.0]
+    axis = axis / np.linalg.norm(axis)
+    size = _WALL_M if upright else _WALL_M[::-1]
+    tip = pose.p_RE + b0
+    centre = tip + (WALL_GAP_M + 0.5 * _WALL_M[0]) * axis
+    yaw = float(np.arctan2(axis[1], axis[0]))
+    return join(make_objects("box", size, centre, yaw=yaw), p_WG=tip + BEHIND_WALL_M * axis)

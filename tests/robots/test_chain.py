@@ -1,0 +1,61 @@
+"""Numerical inverse kinematics of any arm: against the plant, the closed form, and for new arms."""
+
+import numpy as np
+import pytest
+from support.five_joint_arm import five_joint_arm
+
+from lic_drake.robots.kinematics import Kinematics
+from lic_drake.robots.pr2 import pr2_arm
+from lic_drake.robots.registry import get_robot
+
+AHEAD = np.array([1.0, 0.0, 0.0])
+APERTURES = np.array([[0.53, y, z] for y in np.linspace(-0.69, 0.11, 5) for z in (0.45, 0.65, 0.85)])
+
+
+@pytest.mark.parametrize("name", ["iiwa14", "panda", "pr2", "five"])
+def test_all_configurations_at_once_are_those_of_the_plant(name: str) -> None:
+    arm = five_joint_arm() if name == "five" else get_robot(name)
+    q = np.random.default_rng(0).uniform(arm.q_min, arm.q_max, (5, arm.num_joints))
+    chain = arm.kinematics.chain
+    pose = chain.calc_pose(q)
+    for i, row in enumerate(q):
+        one = arm.kinematics.calc_pose(row)
+        for key in ("p_RE", "R_RE", "Jv_E", "Jw_E"):
+            np.testing.assert_allclose(getattr(pose, key)[i], getattr(one, key), atol=1e-12)
+        marks = (one.p_RL[-1], one.p_RL[len(one.p_RL) // 2])
+        assert pose.behind[i] == pytest.approx(sum(abs(one.p_RE[0] - p[0]) for p in marks))
+    moved = q + 1e-6 * np.eye(arm.num_joints)[0]
+    slope = (chain.calc_pose(moved).behind - pose.behind) / 1e-6
+    np.testing.assert_allclose(slope, pose.J_behind[:, 0], atol=1e-5)
+
+
+def test_without_a_closed_form_the_pr2s_starts_cost_the_same() -> None:
+    kinematics = pr2_arm().kinematics
+    places = np.vstack([APERTURES, APERTURES + [0.0, 0.07, -0.04]])
+    general = Kinematics.solve_pointing(kinematics, places, AHEAD)
+    closed = kinematics.solve_pointing(places, AHEAD)
+    assert sum(map(len, closed)) > 1000
+    for q, exact in zip(general, closed, strict=True):
+        assert (len(q) > 0) >= (len(exact) > 0)
+        if len(exact):
+            cost, best = (kinematics.calc_preselection_cost(x[:1])[0] for x in (q, exact))
+            # The closed form tries pan angles half a degree apart.
+            assert 0.98 * best < cost < 1.001 * best
+
+
+@pytest.mark.parametrize("name", ["iiwa14", "panda"])
+def test_new_arms_find_the_cheapest_starts_first(name: str) -> None:
+    arm = get_robot(name)
+    found = arm.solve_pointing(APERTURES, AHEAD)
+    assert sum(len(q) > 0 for q in found) > 10
+    for place, q in zip(APERTURES, found, strict=True):
+        for row in q[::10]:
+            pose = arm.calc_pose(row)
+            np.testing.assert_allclose(pose.p_RE, place, atol=1e-9)
+            np.testing.assert_allclose(pose.R_RE[:, 0], AHEAD, atol=1e-9)
+            assert np.all((row >= arm.q_min) & (row <= arm.q_max))
+        assert np.all(np.diff(arm.kinematics.calc_preselection_cost(q)) >= 0.0)
+        if len(q):  # The whole pose of the first one has it, or a cheaper one, as its first.
+            (again, *_) = arm.solve_ik(arm.tip_pose(q[0]))
+            costs = arm.kinematics.calc_preselection_cost(np.array([again, q[0]]))
+            assert costs[0] <= 1.02 * costs[1]
