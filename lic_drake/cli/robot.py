@@ -11,7 +11,7 @@ def add_parser(subparsers: Subparsers) -> None:
     """Adds the subcommand and its action to the command line."""
     parser = subparsers.add_parser(
         "robot",
-        help="check a robot",
+        help="check a robot of your own",
         description="A robot is one YAML file beside its URDF or SDF model, like"
         " models/robots/iiwa14.yaml; scenario files and --set take its path: {robot: mine.yaml}.",
         epilog="example: lic robot check iiwa14",

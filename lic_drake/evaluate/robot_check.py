@@ -1,8 +1,9 @@
-"""`check_robot`: what a robot is, and whether it reaches a free goal and presses with the threshold.
+"""`check_robot`: what a robot is, and whether it reaches a goal and presses as it should.
 
 Both reaches go through the diagram that all others use, in a scene of their own.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -84,21 +85,22 @@ class RobotCheck:
         for name, row in zip(arm.joint_names, np.transpose(rows).tolist(), strict=True):
             keys = ("lower_deg", "upper_deg", "stiffness_Nm_per_rad", "damping_Nms_per_rad")
             found[name] = dict(zip(keys, row, strict=True))
+        settled = self.settled_N
         distances = np.linalg.norm(np.reshape(self.free.trace.p_WE, (-1, 3)) - self.p_WG, axis=1)
         step = max(1, round(0.5 * self.scenario.mpc.rate_hz))
         pressing = zip(trace.time_s[::step], trace.peak_force[::step], strict=True)
         return found | {
             "reach_m": arm.reach_m,
-            "height_range_m": list(arm.height_range_m),
+            "height_range_m": [x if math.isfinite(x) else None for x in arm.height_range_m],
             "skin_links": list(arm.link_names),
             "taxels": layout.num_taxels,
             "skin_area_m2": layout.num_taxels * layout.pitch_m**2,
             "free_goal": self.free.outcome,
-            "free_goal_distance_m": float(distances.min(initial=np.inf)),
+            "free_goal_distance_m": float(distances.min()) if len(distances) else None,
             "free_goal_time_s": self.free.trace.time_s[-1] if self.free.trace.time_s else 0.0,
             "threshold_N": self.scenario.mpc.force_threshold_N,
             "force_N": {f"{time:.1f} s": round(force, 2) for time, force in pressing},
-            "settled_N": [float(np.min(self.settled_N)), float(np.max(self.settled_N))],
+            "settled_N": [float(x) for x in (settled.min(), settled.max())] if len(settled) else [],
             "reaches": self.reaches,
             "settles": self.settles,
         }

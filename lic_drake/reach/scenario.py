@@ -164,8 +164,8 @@ def _check_stiffness(arm: Arm, mpc: MpcConfig, source: str) -> None:
     worst = int(np.argmax(rise_N))
     if np.isfinite(rise_N[worst]) and rise_N[worst] > mpc.force_threshold_N:
         raise ScenarioError(
-            f"{source}: {arm.joint_names[worst]} of {arm.name}, {arm.stiffness[worst]:g} Nm/rad, is too"
-            f" stiff for a controller at {mpc.rate_hz:g} Hz: a step of {mpc.max_change_deg:g}"
+            f"{source}: {arm.joint_names[worst]} of {arm.name}, {arm.stiffness[worst]:g} Nm/rad, is"
+            f" too stiff for a controller at {mpc.rate_hz:g} Hz: a step of {mpc.max_change_deg:g}"
             f" degrees changes the force at its end by {rise_N[worst]:.1f} N, and the threshold is"
             f" {mpc.force_threshold_N:g} N; lower its stiffness or mpc.max_change_deg"
         )

@@ -194,7 +194,8 @@ class Arm:
         held = dict(self._held)
         parent = parent or plant.world_frame()
         if mobile and self._carriage is None:
-            parent = _add_carriage(plant, arm, parent)
+            # A pedestal is seen itself.
+            parent = _add_carriage(plant, arm, parent, visible=self._fitting is None)
         elif self._carriage is not None and not mobile:
             held |= dict(zip(self._carriage, (0.0, 0.0, height_m), strict=True))
             X_RF = RigidTransform(np.array([0.0, 0.0, -height_m]))
@@ -305,7 +306,9 @@ class Arm:
         self.reach_m = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
 
 
-def _add_carriage(plant: MultibodyPlant, arm: ModelInstanceIndex, frame: Frame) -> Frame:
+def _add_carriage(
+    plant: MultibodyPlant, arm: ModelInstanceIndex, frame: Frame, visible: bool
+) -> Frame:
     """Adds bodies that slide along x, y and z; returns the frame that carries the arm."""
     for axis, direction in zip("xyz", np.eye(3), strict=True):
         body = plant.AddRigidBody(
@@ -313,7 +316,7 @@ def _add_carriage(plant: MultibodyPlant, arm: ModelInstanceIndex, frame: Frame) 
         )
         plant.AddJoint(PrismaticJoint(f"base_{axis}", frame, body.body_frame(), direction))
         frame = body.body_frame()
-    if plant.geometry_source_is_registered():
+    if visible and plant.geometry_source_is_registered():
         X_BV = RigidTransform(np.array([-0.1, 0.0, 0.0]))
         plant.RegisterVisualGeometry(body, X_BV, Box(0.2, 0.2, 0.02), "base_visual", _BASE_COLOR)
     return frame

@@ -11,7 +11,13 @@ import numpy as np
 from pydrake.geometry import Capsule, Cylinder
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
-from pydrake.multibody.tree import FixedOffsetFrame, Joint, JointActuator, ModelInstanceIndex, PdControllerGains
+from pydrake.multibody.tree import (
+    FixedOffsetFrame,
+    Joint,
+    JointActuator,
+    ModelInstanceIndex,
+    PdControllerGains,
+)
 
 from lic_drake.errors import ScenarioError
 from lic_drake.types import Vector

@@ -1,4 +1,4 @@
-"""The known robots. A new one is a robot file, or Python of your own that calls `register_robot`."""
+"""The known robots. A new one is a YAML file, or code of your own that calls `register_robot`."""
 
 from collections.abc import Callable
 from functools import partial

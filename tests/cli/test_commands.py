@@ -91,7 +91,7 @@ def test_what_a_machine_may_read_comes_as_json() -> None:
     with_json = {name for name, parser in LEAVES if "--json" in parser._option_string_actions}
     assert with_json == {
         *("lic reach", "lic select", "lic collect", "lic evaluate", "lic gallery", "lic bench"),
-        *("lic experience info", "lic experience check"),
+        *("lic experience info", "lic experience check", "lic robot check"),
     }
 
 
@@ -129,6 +129,7 @@ WRONG = [
     ("gallery {file}", "cannot write into"),
     ("gallery {none} --method jungle", "choose one of"),
     ("gallery {none} --library {file}", "damaged or not a Parquet file"),
+    ("robot check jungle", "choose one of planar-arm, pr2, iiwa14, panda"),
     ("bench reach --scenario jungle", "shipped scenarios: "),
 ]
 

@@ -34,7 +34,7 @@ def test_an_arm_from_a_file_reaches_and_presses(tmp_path: Path) -> None:
 
 def test_an_arm_that_touches_itself_at_home_is_refused(tmp_path: Path) -> None:
     path = write(tmp_path, "home_deg: -90.0", "home_deg: 140.0")
-    with pytest.raises(ScenarioError, match="touches itself in its home posture: .* and .*; give"):
+    with pytest.raises(ScenarioError, match=r"itself in its home posture: .* and .*; give"):
         check_robot(str(path))
 
 
@@ -49,7 +49,5 @@ def test_in_free_space_the_tip_comes_within_a_centimetre_of_its_goals(name: str)
     places = x0[:3] - b0 + rng.uniform([0.0, -0.3, -0.3], [0.3, 0.3, 0.2], (8, 3))
     found = arm.solve_pointing(places, np.array([1.0, 0.0, 0.0]))
     goals = [place + b0 for place, q in zip(places, found, strict=True) if len(q)]
-    reached = [
-        environment.reach(p_WG, x0, q=arm.q_home).outcome == "reached" for p_WG in goals
-    ]
+    reached = [environment.reach(p_WG, x0, q=arm.q_home).outcome == "reached" for p_WG in goals]
     assert len(goals) > 3 and np.mean(reached) >= 0.95

@@ -9,7 +9,9 @@ from lic_drake.robots.pr2 import pr2_arm
 from lic_drake.robots.registry import get_robot
 
 AHEAD = np.array([1.0, 0.0, 0.0])
-APERTURES = np.array([[0.53, y, z] for y in np.linspace(-0.69, 0.11, 5) for z in (0.45, 0.65, 0.85)])
+APERTURES = np.array(
+    [[0.53, y, z] for y in np.linspace(-0.69, 0.11, 5) for z in (0.45, 0.65, 0.85)]
+)
 
 
 @pytest.mark.parametrize("name", ["iiwa14", "panda", "pr2", "five"])
