@@ -292,8 +292,9 @@ class Arm:
         self._moves = np.array([[float(link.index() in by) for by in moved] for link in links])
 
         context = plant.CreateDefaultContext()
-        for joint, inertia in zip(joints, np.diag(plant.CalcMassMatrix(context)), strict=True):
-            if not inertia > 0.0:
+        inertias = np.diag(plant.CalcMassMatrix(context))
+        for joint, bodies, inertia in zip(joints, moved, inertias, strict=True):
+            if not min(inertia, sum(plant.get_body(body).default_mass() for body in bodies)) > 0.0:
                 raise ValueError(f"joint {joint.name()} moves no mass; give its link an inertia")
         tip = plant.GetFrameByName(self.tip_frame, arm)
         frames = [joint.frame_on_parent() for joint in joints] + [tip]

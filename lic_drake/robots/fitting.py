@@ -1,14 +1,15 @@
 """`Fitting`: what a robot file changes in a model before it becomes an arm."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import ClassVar
 from xml.etree import ElementTree
 
 import numpy as np
-from pydrake.geometry import Capsule, Cylinder
+from pydrake.geometry import Capsule, Cylinder, Sphere
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import (
@@ -60,7 +61,7 @@ class Fitting:
         """Returns the model, as text where its shapes or what they may touch are changed.
 
         Raises:
-            ScenarioError: It is not XML.
+            ScenarioError: It is not XML, or has no such link.
         """
         links = {link for link, _, _ in self.capsules}
         if not links and not self.ignored_contacts:
@@ -69,6 +70,9 @@ class Fitting:
             root = ElementTree.parse(path).getroot()
         except ElementTree.ParseError as error:
             raise ScenarioError(f"model: {path} is not XML: {error}") from None
+        names = [link.get("name", "") for link in root.iter("link")]
+        _check_links(links, names, "capsules")
+        _check_links(chain(*self.ignored_contacts), names, "ignored_contacts")
         ElementTree.register_namespace("drake", _DRAKE[1:-1])
         for link in root.iter("link"):
             for shape in link.findall("collision") if link.get("name") in links else ():
@@ -104,11 +108,6 @@ class Fitting:
             if np.any(low > high):
                 raise ScenarioError(f"joints: {name}: no position is within limits of {limits}")
             joint.set_position_limits(low, high)
-        for pair in self.ignored_contacts:
-            for name in pair:
-                _check_link(plant, arm, name, "ignored_contacts")
-        for link, _, _ in self.capsules:
-            _check_link(plant, arm, link, "capsules")
         if plant.geometry_source_is_registered():
             self._add_shapes(plant, arm)
 
@@ -133,7 +132,8 @@ class Fitting:
         for i, (link, ends, radius) in enumerate(self.capsules):
             body = plant.GetBodyByName(link, arm)
             first, last = np.array(ends)
-            X_LS, shape = _along(last - first), Capsule(radius, math.dist(first, last))
+            X_LS, length = _along(last - first), math.dist(first, last)
+            shape = Capsule(radius, length) if length > 0.0 else Sphere(radius)
             X_LS.set_translation(0.5 * (first + last))
             name = f"{link}_skin{i}"
             plant.RegisterCollisionGeometry(body, X_LS, shape, name, friction)
@@ -163,10 +163,11 @@ def _joint(plant: MultibodyPlant, arm: ModelInstanceIndex, name: str) -> Joint:
     return plant.GetJointByName(name, arm)
 
 
-def _check_link(plant: MultibodyPlant, arm: ModelInstanceIndex, name: str, key: str) -> None:
-    if not plant.HasBodyNamed(name, arm):
-        links = [plant.get_body(i).name() for i in plant.GetBodyIndices(arm)]
-        raise ScenarioError(f"{key}: link {name!r} is not in the model; it has {', '.join(links)}")
+def _check_links(names: Iterable[str], known: Iterable[str], key: str) -> None:
+    for name in names:
+        if name not in known:
+            links = ", ".join(known)
+            raise ScenarioError(f"{key}: link {name!r} is not in the model; it has {links}")
 
 
 def _along(axis: Vector) -> RigidTransform:

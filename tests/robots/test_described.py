@@ -18,11 +18,11 @@ def test_one_file_makes_an_arm(tmp_path: Path) -> None:
     assert (arm.name, arm.num_joints) == ("six-joint-arm", 6)
     assert arm.link_names == ("upper_arm", "forearm", "roll", "wrist", "hand")
     assert {shape.kind for shape in arm.skin} == {"capsule"}
-    np.testing.assert_allclose(arm.calc_pose(np.zeros(6)).p_RE, [1.02, -0.2, 0.7], atol=1e-12)
+    np.testing.assert_allclose(arm.calc_pose(np.zeros(6)).p_RE, [1.02, -0.2, 0.78], atol=1e-12)
     np.testing.assert_allclose(arm.calc_pose(arm.q_home).R_RE[:, 0], [1.0, 0.0, 0.0], atol=1e-12)
     np.testing.assert_allclose(arm.stiffness, [60.0, 60.0, 30.0, 15.0, 15.0, 10.0])
     # Along its axis the first joint moves nothing: the arm is as long as from there.
-    np.testing.assert_allclose(arm.p_RS, [0.0, -0.2, 0.7], atol=1e-12)
+    np.testing.assert_allclose(arm.p_RS, [0.0, -0.2, 0.78], atol=1e-12)
     assert arm.reach_m == pytest.approx(1.02)
     (q, *_) = arm.solve_pointing(np.array([[0.55, -0.2, 0.7]]), np.array([1.0, 0.0, 0.0]))[0]
     np.testing.assert_allclose(arm.calc_pose(q).p_RE, [0.55, -0.2, 0.7], atol=1e-9)
@@ -67,8 +67,8 @@ def test_a_scenario_finds_the_file_beside_itself_and_knows_its_content(tmp_path:
         ("stiffness: 30.0, ", "", "forearm_joint: needs a positive stiffness"),
         ("stiffness: 30.0", "stiffness: soft", "soft"),
         ("stiffness: 30.0, damping: 5.0, ", "", "forearm_joint needs an actuator with controller"),
-        ("home_deg: 50.0", "home: 50.0", "home"),
-        ("home_deg: 50.0", "home_deg: 0, lower_deg: 170.0", "no position is within limits of"),
+        ("home_deg: -50.0", "home: 50.0", "home"),
+        ("home_deg: -50.0", "home_deg: 0, lower_deg: 170.0", "no position is within limits of"),
         ("carriage: add", "carriage: [x, y]", "carriage must be add, or the joints along"),
         ("carriage: add", "carriage: [x, y, z]", "'x'"),
         ("[0.0, 0.4]", "[0.4, 0.0]", "height_range_m must be [least, most]"),
@@ -90,7 +90,7 @@ def test_files_that_describe_no_arm_are_refused_in_one_line(
     ("old", "new", "said"),
     [
         ('lower="-2.5" upper="2.5" ', "", "joint turret_joint has no limits"),
-        ('<mass value="1.0"/>', '<mass value="0.0"/>', "mass"),
+        ("inertial>", "ignored>", "joint turret_joint moves no mass; give its link an inertia"),
         ("</robot>", "", "is not XML"),
         ('type="revolute"', 'type="prismatic"', "joint turret_joint is not revolute"),
     ],

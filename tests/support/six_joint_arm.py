@@ -8,21 +8,21 @@ from pathlib import Path
 # Link: length along its x, axis of its joint, stiffness, damping, home in degrees.
 _LINKS = {
     "turret": (0.06, "0 0 1", 60.0, 12.0, 0.0),
-    "upper_arm": (0.34, "0 1 0", 60.0, 12.0, 50.0),
-    "forearm": (0.32, "0 1 0", 30.0, 5.0, -90.0),
+    "upper_arm": (0.34, "0 1 0", 60.0, 12.0, -50.0),
+    "forearm": (0.32, "0 1 0", 30.0, 5.0, 90.0),
     "roll": (0.06, "1 0 0", 15.0, 1.0, 0.0),
-    "wrist": (0.08, "0 1 0", 15.0, 1.0, 40.0),
+    "wrist": (0.08, "0 1 0", 15.0, 1.0, -40.0),
     "hand": (0.16, "1 0 0", 10.0, 0.5, 0.0),
 }
 _RADIUS = 0.03
 
 
 def _model() -> str:
-    parts, parent, offset = [], "column", 0.0
+    parts, parent, origin = [], "column", "0 0 0.08"
     for name, (length, axis, *_) in _LINKS.items():
         parts.append(f"""
   <joint name="{name}_joint" type="revolute">
-    <parent link="{parent}"/><child link="{name}"/><origin xyz="{offset} 0 0"/>
+    <parent link="{parent}"/><child link="{name}"/><origin xyz="{origin}"/>
     <axis xyz="{axis}"/><limit lower="-2.5" upper="2.5" effort="100" velocity="5"/>
   </joint>
   <link name="{name}">
@@ -31,7 +31,7 @@ def _model() -> str:
       <inertia ixx="0.002" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/>
     </inertial>
   </link>""")
-        parent, offset = name, length
+        parent, origin = name, f"{length} 0 0"
     return f'<robot name="six_joint_arm"><link name="column"/>{"".join(parts)}\n</robot>\n'
 
 
