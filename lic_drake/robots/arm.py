@@ -260,12 +260,15 @@ class Arm:
         gains = {
             a.joint().name(): a.get_controller_gains() for a in actuators if a.has_controller()
         }
+        ordered = [name for name in gains if name in self.joint_names]
         for joint in joints:
             if joint.name() not in gains:
                 raise ValueError(
                     f"joint {joint.name()} needs an actuator with controller gains, or in a robot"
                     " file stiffness and damping"
                 )
+        if ordered != list(self.joint_names):  # In which the plant takes the desired state.
+            raise ValueError(f"actuators must be in the order of the joints, got {ordered}")
         self.stiffness = np.array([gains[joint.name()].p for joint in joints])
         self.damping = np.array([gains[joint.name()].d for joint in joints])
 

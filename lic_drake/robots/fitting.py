@@ -1,7 +1,7 @@
 """`Fitting`: what a robot file changes in a model before it becomes an arm."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -15,7 +15,6 @@ from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import (
     FixedOffsetFrame,
     Joint,
-    JointActuator,
     ModelInstanceIndex,
     PdControllerGains,
 )
@@ -92,12 +91,7 @@ class Fitting:
     def apply(self, plant: MultibodyPlant, arm: ModelInstanceIndex) -> None:
         """Changes a parsed model; a ScenarioError names the key whose value does not fit."""
         self._add_frames(plant, arm)
-        actuators = _actuators(plant, arm)
-        for name, (stiffness, damping) in self.gains.items():
-            joint = _joint(plant, arm, name)
-            if name not in actuators:
-                actuators[name] = plant.AddJointActuator(name, joint)
-            actuators[name].set_controller_gains(PdControllerGains(p=stiffness, d=damping))
+        self._set_gains(plant, arm)
         for name, limits in self.limits_deg.items():
             joint = _joint(plant, arm, name)
             low, high = joint.position_lower_limits(), joint.position_upper_limits()
@@ -126,6 +120,25 @@ class Fitting:
             X = X.inverse() if key == "base" else X
             plant.AddFrame(FixedOffsetFrame(name, plant.GetFrameByName(frame, arm), X, arm))
 
+    def _set_gains(self, plant: MultibodyPlant, arm: ModelInstanceIndex) -> None:
+        """Adds an actuator to each joint with gains, from the base to the tip.
+
+        In that order the plant takes the desired state, whatever the model's order is.
+        """
+        every = map(plant.get_joint_actuator, plant.GetJointActuatorIndices())
+        old = {a.joint().name(): a for a in every if a.model_instance() == arm}
+        for joint in sorted((_joint(plant, arm, name) for name in self.gains), key=_depth(plant)):
+            name, effort, rotor, gear = joint.name(), np.inf, 0.0, 1.0
+            if name in old:
+                effort, gear = old[name].effort_limit(), old[name].default_gear_ratio()
+                rotor = old[name].default_rotor_inertia()
+                plant.RemoveJointActuator(old[name])
+            actuator = plant.AddJointActuator(name, joint, effort)
+            actuator.set_default_rotor_inertia(rotor)
+            actuator.set_default_gear_ratio(gear)
+            stiffness, damping = self.gains[name]
+            actuator.set_controller_gains(PdControllerGains(p=stiffness, d=damping))
+
     def _add_shapes(self, plant: MultibodyPlant, arm: ModelInstanceIndex) -> None:
         """Adds the skin and the pedestal; the scene gives the skin its contact properties."""
         friction = CoulombFriction(0.0, 0.0)
@@ -148,10 +161,16 @@ class Fitting:
             plant.RegisterVisualGeometry(body, X_LP, column, "pedestal", _PEDESTAL_COLOR)
 
 
-def _actuators(plant: MultibodyPlant, arm: ModelInstanceIndex) -> dict[str, JointActuator]:
-    """Returns the actuators of an arm, by joint; those of one instance are only known later."""
-    every = map(plant.get_joint_actuator, plant.GetJointActuatorIndices())
-    return {a.joint().name(): a for a in every if a.model_instance() == arm}
+def _depth(plant: MultibodyPlant) -> Callable[[Joint], int]:
+    """Returns how many joints are between the base and a joint."""
+    joints = [plant.get_joint(index) for index in plant.GetJointIndices()]
+    above = {joint.child_body().index(): joint for joint in joints}
+
+    def depth(joint: Joint) -> int:
+        parent = above.get(joint.parent_body().index())
+        return 0 if parent is None else 1 + depth(parent)
+
+    return depth
 
 
 def _joint(plant: MultibodyPlant, arm: ModelInstanceIndex, name: str) -> Joint:

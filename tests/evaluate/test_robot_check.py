@@ -33,7 +33,7 @@ def test_an_arm_from_a_file_reaches_and_presses(tmp_path: Path) -> None:
 
 
 def test_an_arm_that_touches_itself_at_home_is_refused(tmp_path: Path) -> None:
-    path = write(tmp_path, "home_deg: 90.0", "home_deg: -140.0")
+    path = write(tmp_path, "home_deg: -50.0", "home_deg: 80.0")
     with pytest.raises(ScenarioError, match=r"itself in its home posture: .* and .*; give"):
         check_robot(str(path))
 
