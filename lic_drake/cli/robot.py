@@ -51,7 +51,7 @@ def run_check(args: argparse.Namespace) -> int:
 
         trace = check.pressing.trace
         try:
-            camera = StillCamera(check.scenario, check.wall, check.wall.p_WG)
+            camera = StillCamera(check.scenario, check.wall, check.p_WG_wall)
             still = camera.take("", trace.b0, trace.states[-1])
             values["still"] = str(args.out / f"{values['robot']}.png")
             save_figure(draw_still(still, f"{values['robot']}"), Path(values["still"]), False)

@@ -48,7 +48,8 @@ class RobotCheck:
     Attributes:
         scenario: The scenario of both reaches.
         free: The reach to a free goal, p_WG, shape (3,), metres.
-        wall: What the second one presses on, and its goal, p_WG.
+        wall: What the second one presses on.
+        p_WG_wall: Its goal, behind it, shape (3,), metres.
         pressing: The second reach, with its states.
     """
 
@@ -56,6 +57,7 @@ class RobotCheck:
     p_WG: Vector
     free: ReachResult
     wall: ClutterInstance
+    p_WG_wall: Vector
     pressing: ReachResult
 
     @property
@@ -130,12 +132,18 @@ def check_robot(name: str) -> RobotCheck:
     axes = 2 if arm.is_planar else 3
     x0[:axes] += b0[:axes]
     free = Environment(scenario, join(), sleep=False).reach(p_WG, x0, q=arm.q_home)
-    wall = _wall(arm, b0)
+    wall, p_WG_wall = _wall(arm, b0)
     scenario.stop.timeout_s = PRESS_S
-    pressing = Environment(scenario, wall, sleep=False).reach(
-        np.asarray(wall.p_WG), x0, keep_states=True, q=arm.q_home
+    environment = Environment(scenario, wall, sleep=False)
+    pressing = environment.reach(p_WG_wall, x0, keep_states=True, q=arm.q_home)
+    return RobotCheck(
+        scenario=scenario,
+        p_WG=p_WG,
+        free=free,
+        wall=wall,
+        p_WG_wall=p_WG_wall,
+        pressing=pressing,
     )
-    return RobotCheck(scenario=scenario, p_WG=p_WG, free=free, wall=wall, pressing=pressing)
 
 
 def _free_goal(arm: Arm) -> Vector:
@@ -152,8 +160,8 @@ def _free_goal(arm: Arm) -> Vector:
     return foremost
 
 
-def _wall(arm: Arm, b0: Vector) -> ClutterInstance:
-    """Returns an upright wall before the hand at home, or a table under it, with the goal behind.
+def _wall(arm: Arm, b0: Vector) -> tuple[ClutterInstance, Vector]:
+    """Returns an upright wall before the hand at home, or a table under it, and a goal behind.
 
     The wall is across the hand's direction.
     """
@@ -166,4 +174,4 @@ def _wall(arm: Arm, b0: Vector) -> ClutterInstance:
     tip = pose.p_RE + b0
     centre = tip + (WALL_GAP_M + 0.5 * _WALL_M[0]) * axis
     yaw = float(np.arctan2(axis[1], axis[0]))
-    return join(make_objects("box", size, centre, yaw=yaw), p_WG=tip + BEHIND_WALL_M * axis)
+    return join(make_objects("box", size, centre, yaw=yaw)), tip + BEHIND_WALL_M * axis

@@ -101,8 +101,9 @@ class Arm:
         scene_graph = SceneGraph()
         plant.RegisterAsSourceForSceneGraph(scene_graph)
         try:
-            fits = fitting is not None and isinstance(model, Path)
-            self._model = fitting.read_model(model) if fits else model
+            self._model = model
+            if isinstance(model, Path) and fitting is not None:
+                self._model = fitting.read_model(model)
             self._read(plant, scene_graph, skin_links, (q_min, q_max), home or {}, kinematics)
         except (OSError, RuntimeError, ValueError) as error:
             raise ScenarioError(
