@@ -21,7 +21,7 @@ from lic_drake.paths import scenarios_dir
 from lic_drake.reach.task import StopConfig, Task
 from lic_drake.robots.arm import Arm
 from lic_drake.robots.described import robot_path
-from lic_drake.robots.registry import get_robot
+from lic_drake.robots.registry import get_robot, robot_digest
 from lic_drake.scene.scene import SceneConfig
 from lic_drake.seeds import make_generator
 from lic_drake.types import Vector
@@ -48,7 +48,7 @@ class Scenario:
     @property
     def digest(self) -> str:
         """Identifies the scenario's values: 12 hexadecimal digits."""
-        identity = _identity(self) | {"robot": self.arm().digest}
+        identity = _identity(self) | {"robot": robot_digest(self.robot)}
         values = json.dumps(identity, sort_keys=True, default=repr)
         return hashlib.sha256(values.encode()).hexdigest()[:12]
 

@@ -12,7 +12,7 @@ from lic_drake.robots.arm import Arm
 from lic_drake.robots.registry import get_robot
 
 FACTS = json.loads((Path(__file__).parents[1] / "data" / "arm_facts.json").read_text())
-ROD_M = {"iiwa14": 0.25, "panda": 0.35}
+ROD_M = {"iiwa14": 0.25, "panda": 0.325}
 MOUNT = {"iiwa14": (-0.2, -0.188, 0.43), "panda": (-0.2, -0.188, 0.457)}
 each_arm = pytest.mark.parametrize("name", ROD_M)
 
