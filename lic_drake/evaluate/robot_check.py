@@ -15,7 +15,8 @@ from lic_drake.errors import ScenarioError
 from lic_drake.reach.environment import Environment
 from lic_drake.reach.scenario import Scenario, load_scenario
 from lic_drake.reach.trace import ReachResult
-from lic_drake.robots.arm import Arm
+from lic_drake.robots.arm import Arm, SkinShape
+from lic_drake.robots.kinematics import ArmPose
 from lic_drake.robots.registry import get_robot
 from lic_drake.scene.collision import CollisionChecker
 from lic_drake.types import Vector
@@ -27,7 +28,7 @@ GOAL_TURN_RAD = 0.6
 """By how much each joint may differ from home at the free goal."""
 
 WALL_GAP_M = 0.01
-"""Distance of the wall from the tip at home."""
+"""Distance of the wall from the foremost skin at home."""
 
 BEHIND_WALL_M = 0.15
 """Distance of the goal that makes the arm press on the wall, behind the tip at home."""
@@ -100,6 +101,7 @@ class RobotCheck:
             "free_goal": self.free.outcome,
             "free_goal_distance_m": float(distances.min()) if len(distances) else None,
             "free_goal_time_s": self.free.trace.time_s[-1] if self.free.trace.time_s else 0.0,
+            "wall": self.pressing.detail or self.pressing.outcome,
             "threshold_N": self.scenario.mpc.force_threshold_N,
             "force_N": {f"{time:.1f} s": round(force, 2) for time, force in pressing},
             "settled_N": [float(x) for x in (settled.min(), settled.max())] if len(settled) else [],
@@ -172,6 +174,17 @@ def _wall(arm: Arm, b0: Vector) -> tuple[ClutterInstance, Vector]:
     axis = axis / np.linalg.norm(axis)
     size = _WALL_M if upright else _WALL_M[::-1]
     tip = pose.p_RE + b0
-    centre = tip + (WALL_GAP_M + 0.5 * _WALL_M[0]) * axis
+    front = max(_foremost(arm, pose, shape.enclosing_capsule(), axis) for shape in arm.skin)
+    beyond = max(front - float(axis @ pose.p_RE), 0.0)
+    centre = tip + (beyond + WALL_GAP_M + 0.5 * _WALL_M[0]) * axis
     yaw = float(np.arctan2(axis[1], axis[0]))
-    return join(make_objects("box", size, centre, yaw=yaw)), tip + BEHIND_WALL_M * axis
+    return join(make_objects("box", size, centre, yaw=yaw)), tip + (beyond + BEHIND_WALL_M) * axis
+
+
+def _foremost(arm: Arm, pose: ArmPose, capsule: SkinShape, axis: Vector) -> float:
+    """Returns how far a capsule of skin reaches along an axis of R, metres."""
+    link = arm.link_names.index(capsule.link)
+    radius, length = capsule.size
+    centre = pose.p_RL[link] + pose.R_RL[link] @ capsule.p_LS
+    along = pose.R_RL[link] @ capsule.R_LS[:, 2]
+    return float(axis @ centre + 0.5 * length * abs(axis @ along) + radius)

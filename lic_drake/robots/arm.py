@@ -53,7 +53,7 @@ class Arm:
         carriage: The joints along x, y and z that carry R in the model of a mobile robot.
         height_range_m: Lowest and highest position of R along z, metres.
         is_planar: Whether the arm moves in the plane z = 0; hand poses are then (x, y, phi).
-        home: A posture far from limits by joint, radians; 0 for those left out.
+        home: A posture by joint, radians, 0 where left out; by default in the middle of the limits.
         digest: Tells robots of the same name apart; by default the name.
         fitting: What is to be changed in the model.
         kinematics: A class that knows some of the kinematics in closed form.
@@ -104,7 +104,7 @@ class Arm:
             self._model = model
             if isinstance(model, Path) and fitting is not None:
                 self._model = fitting.read_model(model)
-            self._read(plant, scene_graph, skin_links, (q_min, q_max), home or {}, kinematics)
+            self._read(plant, scene_graph, skin_links, (q_min, q_max), home, kinematics)
         except (OSError, RuntimeError, ValueError) as error:
             raise ScenarioError(
                 f"the model of {name} does not describe {'a planar' if is_planar else 'an'} arm:"
@@ -232,7 +232,7 @@ class Arm:
         scene_graph: SceneGraph,
         skin_links: Sequence[str] | None,
         limits: tuple[Vector | None, Vector | None],
-        home: Mapping[str, float],
+        home: Mapping[str, float] | None,
         kinematics: type[Kinematics],
     ) -> None:
         """Takes everything but names from the model; Drake's errors are RuntimeErrors."""
@@ -255,8 +255,10 @@ class Arm:
         for joint, ends in zip(joints, zip(self.q_min, self.q_max, strict=True), strict=True):
             if not np.all(np.isfinite(ends)):
                 raise ValueError(f"joint {joint.name()} has no limits; give both of them")
-        angles = [home.get(joint.name(), 0.0) for joint in joints]
-        self.q_home = np.clip(angles, self.q_min, self.q_max)
+        self.q_home = 0.5 * (self.q_min + self.q_max)
+        if home is not None:
+            angles = [home.get(joint.name(), 0.0) for joint in joints]
+            self.q_home = np.clip(angles, self.q_min, self.q_max)
         actuators = map(plant.get_joint_actuator, plant.GetJointActuatorIndices(arm))
         gains = {
             a.joint().name(): a.get_controller_gains() for a in actuators if a.has_controller()
