@@ -125,16 +125,12 @@ class Arm:
         levers = np.zeros(self.num_joints)
         for capsule in (shape.enclosing_capsule() for shape in self.skin):
             link = self.link_names.index(capsule.link)
-            last = self.num_moving(link) - 1
+            last = int(self._moves[link].sum()) - 1
             centre = pose.p_RL[link] + pose.R_RL[link] @ capsule.p_LS
             beyond = 0.5 * capsule.size[1] + math.dist(centre, self.p_RJ[last])
             reach = along[last] - along[: last + 1] + beyond
             levers[: last + 1] = np.maximum(levers[: last + 1], reach)
         return levers
-
-    def num_moving(self, link: int) -> int:
-        """Returns by how many joints a skin link is moved, given by its index."""
-        return int(self._moves[link].sum())
 
     @property
     def pose_size(self) -> int:
