@@ -53,8 +53,9 @@ def run_check(args: argparse.Namespace) -> int:
         try:
             camera = StillCamera(check.scenario, check.wall, check.p_WG_wall)
             still = camera.take("", trace.b0, trace.states[-1])
-            values["still"] = str(args.out / f"{values['robot']}.png")
-            save_figure(draw_still(still, f"{values['robot']}"), Path(values["still"]), False)
+            path = args.out / f"{values['robot']}.png"
+            save_figure(draw_still(still, values["robot"]), path, False)
+            values["still"] = str(path)
         except RenderingError as error:
             remark(f"lic: no still: {error}")
     print_result(args, values)

@@ -21,7 +21,7 @@ from lic_drake.paths import scenarios_dir
 from lic_drake.reach.task import StopConfig, Task
 from lic_drake.robots.arm import Arm
 from lic_drake.robots.described import robot_path
-from lic_drake.robots.registry import get_robot, robot_digest
+from lic_drake.robots.registry import get_robot
 from lic_drake.scene.scene import SceneConfig
 from lic_drake.seeds import make_generator
 from lic_drake.types import Vector
@@ -48,7 +48,7 @@ class Scenario:
     @property
     def digest(self) -> str:
         """Identifies the scenario's values: 12 hexadecimal digits."""
-        identity = _identity(self) | {"robot": robot_digest(self.robot)}
+        identity = _identity(self) | {"robot": self.arm().digest}
         values = json.dumps(identity, sort_keys=True, default=repr)
         return hashlib.sha256(values.encode()).hexdigest()[:12]
 
@@ -124,9 +124,10 @@ def parse_scenario(content: str | bytes, overrides: str = "", source: str = "sce
             raise ScenarioError(f"{source}: {key} must be a name, got {data.get(key)!r}")
     sampler = get_category(data["category"]).sampler
     robot = robot_path(data["robot"], source)
-    get_robot(robot)
     mpc, preset = data.get("mpc"), "haptic_mpc_2013"
-    if isinstance(mpc, dict):
+    arm = get_robot(robot)
+    if mpc is None or isinstance(mpc, dict):
+        mpc = arm.mpc | (mpc or {})
         preset = mpc.pop("preset", preset)
     if not isinstance(preset, str) or preset not in PRESETS:
         raise ScenarioError(f"{source}: unknown mpc preset {preset!r}; choose {list(PRESETS)}")
@@ -139,8 +140,8 @@ def parse_scenario(content: str | bytes, overrides: str = "", source: str = "sce
         mpc=read_section(MpcConfig, mpc, f"{source}: mpc", defaults=PRESETS[preset]()),
         stop=read_section(StopConfig, data.get("stop"), f"{source}: stop"),
     )
-    scenario.arm().check_height(scenario.task.torso_m)
-    _check_stiffness(scenario.arm(), scenario.mpc, source)
+    arm.check_height(scenario.task.torso_m)
+    _check_stiffness(arm, scenario.mpc, source)
     if scenario.task.goal_area is None and len(scenario.goals("training", 0)) == 0:
         raise ScenarioError(
             f"{source}: task: goal_area cannot be null, because an environment of"

@@ -1,7 +1,7 @@
 """`Arm`: a robot arm with an impedance controller and a tactile skin, from a model file."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import cast
@@ -23,7 +23,6 @@ from pydrake.multibody.tree import (
 from pydrake.systems.framework import Context
 
 from lic_drake.errors import ScenarioError
-from lic_drake.robots.fitting import Fitting
 from lic_drake.robots.kinematics import ArmPose, Kinematics
 from lic_drake.robots.skin import SkinShape as SkinShape
 from lic_drake.robots.skin import read_skin
@@ -55,7 +54,8 @@ class Arm:
         is_planar: Whether the arm moves in the plane z = 0; hand poses are then (x, y, phi).
         home: A posture by joint, radians, 0 where left out; by default in the middle of the limits.
         digest: Tells robots of the same name apart; by default the name.
-        fitting: What is to be changed in the model.
+        mpc: Values of the controller that suit the gains; a scenario may override them.
+        fit: Changes the parsed model, as a robot file wants it, and gives the arm a pedestal.
         kinematics: A class that knows some of the kinematics in closed form.
 
     Attributes:
@@ -90,20 +90,19 @@ class Arm:
         is_planar: bool = False,
         home: Mapping[str, float] | None = None,
         digest: str = "",
-        fitting: Fitting | None = None,
+        mpc: Mapping[str, float] | None = None,
+        fit: Callable[[MultibodyPlant, ModelInstanceIndex], None] | None = None,
         kinematics: type[Kinematics] = Kinematics,
     ) -> None:
         self.name, self.is_planar, self.digest = name, is_planar, digest or name
         self.base_frame, self.tip_frame = base_frame, tip_frame
-        self._held, self._carriage, self._fitting = dict(held or {}), carriage, fitting
+        self._model, self._held, self._carriage, self._fit = model, dict(held or {}), carriage, fit
+        self.mpc = dict(mpc or {})
         self.height_range_m = height_range_m
         plant = MultibodyPlant(time_step=1e-3)
         scene_graph = SceneGraph()
         plant.RegisterAsSourceForSceneGraph(scene_graph)
         try:
-            self._model = model
-            if isinstance(model, Path) and fitting is not None:
-                self._model = fitting.read_model(model)
             self._read(plant, scene_graph, skin_links, (q_min, q_max), home, kinematics)
         except (OSError, RuntimeError, ValueError) as error:
             raise ScenarioError(
@@ -186,13 +185,13 @@ class Arm:
             kind = "sdf" if "<sdf" in self._model[:1000] else "urdf"
             (arm,) = Parser(plant).AddModelsFromString(self._model, kind)
         plant.set_gravity_enabled(arm, False)
-        if self._fitting is not None:
-            self._fitting.apply(plant, arm)
+        if self._fit is not None:
+            self._fit(plant, arm)
         held = dict(self._held)
         parent = parent or plant.world_frame()
         if mobile and self._carriage is None:
             # A pedestal is seen itself.
-            parent = _add_carriage(plant, arm, parent, visible=self._fitting is None)
+            parent = _add_carriage(plant, arm, parent, visible=self._fit is None)
         elif self._carriage is not None and not mobile:
             held |= dict(zip(self._carriage, (0.0, 0.0, height_m), strict=True))
             X_RF = RigidTransform(np.array([0.0, 0.0, -height_m]))
@@ -253,8 +252,11 @@ class Arm:
                 raise ValueError(f"joint {joint.name()} has no limits; give both of them")
         self.q_home = 0.5 * (self.q_min + self.q_max)
         if home is not None:
-            angles = [home.get(joint.name(), 0.0) for joint in joints]
-            self.q_home = np.clip(angles, self.q_min, self.q_max)
+            self.q_home = np.array([home.get(joint.name(), 0.0) for joint in joints])
+            beyond = np.maximum(self.q_min - self.q_home, self.q_home - self.q_max)
+            if np.any(beyond > 0.0):
+                worst = self.joint_names[int(np.argmax(beyond))]
+                raise ValueError(f"joint {worst} is beyond its limits in the home posture")
         actuators = map(plant.get_joint_actuator, plant.GetJointActuatorIndices(arm))
         gains = {
             a.joint().name(): a.get_controller_gains() for a in actuators if a.has_controller()

@@ -5,20 +5,32 @@ is fixed in it, and the hand points along Ex of the tip.
 """
 
 import hashlib
-from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass, field, fields
 from functools import lru_cache
+from itertools import chain
 from pathlib import Path
-from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
+from pydrake.geometry import Capsule, Cylinder, Sphere
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.multibody.parsing import PackageMap
+from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
+from pydrake.multibody.tree import FixedOffsetFrame, Joint, ModelInstanceIndex, PdControllerGains
 
 from lic_drake.config import check_numbers, read_mapping, read_named, read_section
 from lic_drake.errors import ScenarioError
 from lic_drake.paths import robots_dir
 from lic_drake.robots.arm import Arm
-from lic_drake.robots.fitting import Fitting
+from lic_drake.types import Vector
+
+_BASE, _TIP = "fitted_base", "fitted_tip"
+_DRAKE = "{http://drake.mit.edu}"
+_SKIN_COLOR = np.array([0.66, 0.67, 0.69, 1.0])
+_PEDESTAL_COLOR = np.array([0.35, 0.35, 0.38, 1.0])
+_PEDESTAL_RADIUS_M = 0.09
 
 
 @dataclass(kw_only=True)
@@ -74,6 +86,8 @@ class RobotFile:
     carriage: list[str] = field(default_factory=list)
     # Lowest and highest position of R, metres.
     height_range_m: list[float] = field(default_factory=lambda: [0.0, 0.0])
+    # Values of the controller that suit the gains; those of a scenario come first.
+    mpc: dict[str, float] = field(default_factory=dict)
     # Pairs of links that touch by their design, as neighbours but one do.
     ignored_contacts: list[list[str]] = field(default_factory=list)
 
@@ -99,6 +113,113 @@ class RobotFile:
                     f"joints: {name}: needs a positive stiffness, Nm/rad, and damping, Nms/rad, got"
                     f" {joint.stiffness} and {joint.damping}"
                 )
+
+    def read_model(self, path: Path) -> Path | str:
+        """Returns the model, as text where its shapes or what they may touch are changed.
+
+        Raises:
+            ScenarioError: It is not XML, or has no such link.
+        """
+        links = {capsule.link for capsule in self.capsules}
+        if not links and not self.ignored_contacts:
+            return path
+        try:
+            root = ElementTree.parse(path).getroot()
+        except ElementTree.ParseError as error:
+            raise ScenarioError(f"model: {path} is not XML: {error}") from None
+        names = [link.get("name", "") for link in root.iter("link")]
+        _check_links(links, names, "capsules")
+        _check_links(chain(*self.ignored_contacts), names, "ignored_contacts")
+        ElementTree.register_namespace("drake", _DRAKE[1:-1])
+        for link in root.iter("link"):
+            for shape in link.findall("collision") if link.get("name") in links else ():
+                link.remove(shape)
+        model = root.find("model")
+        for i, pair in enumerate(self.ignored_contacts):
+            (root if model is None else model).append(_ignored(f"ignored{i}", pair))
+        # Text has no folder: what it names must not be relative.
+        for part in root.iter():
+            name = part.get("filename")
+            if name is not None:
+                part.set("filename", _absolute(name, path.parent))
+            if part.tag == "uri" and part.text:
+                part.text = _absolute(part.text.strip(), path.parent)
+        return ElementTree.tostring(root, encoding="unicode")
+
+    def fit(self, plant: MultibodyPlant, arm: ModelInstanceIndex) -> None:
+        """Changes a parsed model; a ScenarioError names the key whose value does not fit."""
+        self._add_frames(plant, arm)
+        self._set_gains(plant, arm)
+        for name, given in self.joints.items():
+            joint = _joint(plant, arm, name)
+            low, high = joint.position_lower_limits(), joint.position_upper_limits()
+            if given.lower_deg is not None:
+                low = np.maximum(low, math.radians(given.lower_deg))
+            if given.upper_deg is not None:
+                high = np.minimum(high, math.radians(given.upper_deg))
+            if np.any(low > high):
+                raise ScenarioError(
+                    f"joints: {name}: no position is within limits of {given.lower_deg} and"
+                    f" {given.upper_deg} degrees and of the model"
+                )
+            joint.set_position_limits(low, high)
+        if plant.geometry_source_is_registered():
+            self._add_shapes(plant, arm)
+
+    def _add_frames(self, plant: MultibodyPlant, arm: ModelInstanceIndex) -> None:
+        for key, name, place in (("base", _BASE, self.base), ("tip", _TIP, self.tip)):
+            if not plant.HasFrameNamed(place.frame, arm):
+                frames = [plant.get_frame(i).name() for i in plant.GetFrameIndices(arm)]
+                raise ScenarioError(
+                    f"{key}: frame {place.frame!r} is not in the model; it has"
+                    f" {', '.join(filter(None, frames))}"
+                )
+            X = RigidTransform(RollPitchYaw(np.deg2rad(place.rpy_deg)), np.array(place.xyz))
+            X = X.inverse() if key == "base" else X
+            plant.AddFrame(FixedOffsetFrame(name, plant.GetFrameByName(place.frame, arm), X, arm))
+
+    def _set_gains(self, plant: MultibodyPlant, arm: ModelInstanceIndex) -> None:
+        """Adds an actuator to each joint with gains, from the base to the tip.
+
+        In that order the plant takes the desired state, whatever the model's order is.
+        """
+        every = map(plant.get_joint_actuator, plant.GetJointActuatorIndices())
+        old = {a.joint().name(): a for a in every if a.model_instance() == arm}
+        given = [name for name, joint in self.joints.items() if joint.stiffness is not None]
+        for joint in sorted((_joint(plant, arm, name) for name in given), key=_depth(plant)):
+            name, effort, rotor, gear = joint.name(), np.inf, 0.0, 1.0
+            if name in old:
+                effort, gear = old[name].effort_limit(), old[name].default_gear_ratio()
+                rotor = old[name].default_rotor_inertia()
+                plant.RemoveJointActuator(old[name])
+            actuator = plant.AddJointActuator(name, joint, effort)
+            actuator.set_default_rotor_inertia(rotor)
+            actuator.set_default_gear_ratio(gear)
+            gains = self.joints[name]
+            actuator.set_controller_gains(PdControllerGains(p=gains.stiffness, d=gains.damping))
+
+    def _add_shapes(self, plant: MultibodyPlant, arm: ModelInstanceIndex) -> None:
+        """Adds the skin and the pedestal; the scene gives the skin its contact properties."""
+        friction = CoulombFriction(0.0, 0.0)
+        for i, capsule in enumerate(self.capsules):
+            body, radius = plant.GetBodyByName(capsule.link, arm), capsule.radius_m
+            first, last = np.array(capsule.ends)
+            X_LS, length = _along(last - first), math.dist(first, last)
+            shape = Capsule(radius, length) if length > 0.0 else Sphere(radius)
+            X_LS.set_translation(0.5 * (first + last))
+            name = f"{capsule.link}_skin{i}"
+            plant.RegisterCollisionGeometry(body, X_LS, shape, name, friction)
+            plant.RegisterVisualGeometry(body, X_LS, shape, name, _SKIN_COLOR)
+        # What the base stands on, down to the floor when it is highest.
+        pedestal_m = 0.0 if self.carriage else self.base.xyz[2] + self.height_range_m[1]
+        if pedestal_m > 0.0:
+            frame = plant.GetFrameByName(self.base.frame, arm)
+            X_BP = RigidTransform(np.array([0.0, 0.0, -0.5 * pedestal_m]))
+            column = Cylinder(_PEDESTAL_RADIUS_M, pedestal_m)
+            X_LP = frame.GetFixedPoseInBodyFrame() @ X_BP
+            body = frame.body()
+            plant.RegisterCollisionGeometry(body, X_LP, column, "pedestal", friction)
+            plant.RegisterVisualGeometry(body, X_LP, column, "pedestal", _PEDESTAL_COLOR)
 
 
 def described_robot(name: str | Path) -> Arm:
@@ -132,21 +253,23 @@ def _read(content: bytes, path: Path) -> Arm:
             raise ScenarioError(f"{source}: unknown key {key!r}; known: {', '.join(known)}")
     robot = read_section(RobotFile, data, source)
     model = _find_model(robot.model, path)
-    shipped = path.parent == robots_dir()
-    digest = hashlib.sha256(content + model.read_bytes()).hexdigest()[:12]
+    identity = repr(asdict(robot)).encode() + model.read_bytes()
     try:
         return Arm(
             path.stem,
-            model,
-            base_frame=Fitting.BASE,
-            tip_frame=Fitting.TIP,
+            robot.read_model(model),
+            base_frame=_BASE,
+            tip_frame=_TIP,
             skin_links=robot.skin_links or None,
             held={name: j.held for name, j in robot.joints.items() if j.held is not None},
-            carriage=_three(robot.carriage),
+            carriage=(robot.carriage[0], robot.carriage[1], robot.carriage[2])
+            if robot.carriage
+            else None,
             height_range_m=(robot.height_range_m[0], robot.height_range_m[1]),
-            home={name: float(np.deg2rad(j.home_deg)) for name, j in robot.joints.items()},
-            digest=path.stem if shipped else f"{path.stem}-{digest}",
-            fitting=_fitting(robot),
+            home={name: math.radians(j.home_deg) for name, j in robot.joints.items()},
+            digest=f"{path.stem}-{hashlib.sha256(identity).hexdigest()[:12]}",
+            mpc=robot.mpc,
+            fit=robot.fit,
         )
     except ScenarioError as error:
         raise ScenarioError(f"{source}: {error}") from None
@@ -169,22 +292,50 @@ def _find_model(model: str, path: Path) -> Path:
     return found
 
 
-def _fitting(robot: RobotFile) -> Fitting:
-    """Returns what is to be changed in the model."""
-    return Fitting(
-        base=(robot.base.frame, robot.base.xyz, robot.base.rpy_deg),
-        tip=(robot.tip.frame, robot.tip.xyz, robot.tip.rpy_deg),
-        capsules=[(c.link, c.ends, c.radius_m) for c in robot.capsules],
-        gains={
-            name: (joint.stiffness, joint.damping)
-            for name, joint in robot.joints.items()
-            if joint.stiffness is not None and joint.damping is not None
-        },
-        limits_deg={name: (j.lower_deg, j.upper_deg) for name, j in robot.joints.items()},
-        ignored_contacts=robot.ignored_contacts,
-        pedestal_m=0.0 if robot.carriage else robot.base.xyz[2] + robot.height_range_m[1],
-    )
+def _depth(plant: MultibodyPlant) -> Callable[[Joint], int]:
+    """Returns how many joints are between the base and a joint."""
+    joints = [plant.get_joint(index) for index in plant.GetJointIndices()]
+    above = {joint.child_body().index(): joint for joint in joints}
+
+    def depth(joint: Joint) -> int:
+        parent = above.get(joint.parent_body().index())
+        return 0 if parent is None else 1 + depth(parent)
+
+    return depth
 
 
-def _three(names: Sequence[str]) -> Any:
-    return tuple(names) or None
+def _joint(plant: MultibodyPlant, arm: ModelInstanceIndex, name: str) -> Joint:
+    """Returns a joint; a ScenarioError if there is none."""
+    if not plant.HasJointNamed(name, arm):
+        joints = [plant.get_joint(i) for i in plant.GetJointIndices(arm)]
+        moving = [joint.name() for joint in joints if joint.num_positions()]
+        raise ScenarioError(f"joints: {name!r} is not in the model; it has {', '.join(moving)}")
+    return plant.GetJointByName(name, arm)
+
+
+def _check_links(names: Iterable[str], known: Iterable[str], key: str) -> None:
+    for name in names:
+        if name not in known:
+            links = ", ".join(known)
+            raise ScenarioError(f"{key}: link {name!r} is not in the model; it has {links}")
+
+
+def _along(axis: Vector) -> RigidTransform:
+    """Returns a rotation that lays Sz along an axis, which may be 0: then none."""
+    if not np.any(axis):
+        return RigidTransform()
+    return RigidTransform(RotationMatrix.MakeFromOneVector(axis, 2), np.zeros(3))
+
+
+def _ignored(name: str, links: Sequence[str]) -> ElementTree.Element:
+    """Returns a group of links that may touch, in the words of URDF (attributes) and SDF (text)."""
+    group = ElementTree.Element(f"{_DRAKE}collision_filter_group", name=name)
+    for link in links:
+        ElementTree.SubElement(group, f"{_DRAKE}member", link=link).text = link
+    ignored = f"{_DRAKE}ignored_collision_filter_group"
+    ElementTree.SubElement(group, ignored, name=name).text = name
+    return group
+
+
+def _absolute(name: str, folder: Path) -> str:
+    return name if "://" in name else str((folder / name).resolve())

@@ -36,11 +36,6 @@ def get_robot(name: str) -> Arm:
     return _ROBOTS.get(name)()
 
 
-def robot_digest(name: str) -> str:
-    """Returns what tells a robot from others in a scenario: its name, and a file's content."""
-    return get_robot(name).digest if Path(name).suffix else name
-
-
 register_robot("planar-arm", planar_arm)
 register_robot("pr2", pr2_arm)
 for _path in sorted(robots_dir().glob("*.yaml")):

@@ -16,15 +16,15 @@ from lic_drake.reach.scenario import load_scenario
 def assert_reaches_and_settles(check: RobotCheck) -> None:
     assert check.reaches and check.settles
     threshold = check.scenario.mpc.force_threshold_N
-    np.testing.assert_allclose(check.settled_N, threshold, rtol=0.2)
+    assert check.settled_N[1] == pytest.approx(threshold, rel=0.1)
     assert max(check.free.trace.peak_force) == 0.0
     values = check.values()
     assert values["free_goal"] == "reached" and values["free_goal_distance_m"] < 0.015
     assert values["taxels"] > 100 and values["skin_area_m2"] > 0.01
 
 
-@pytest.mark.parametrize("name", ["iiwa14", "panda"])
-def test_new_arms_reach_and_press(name: str) -> None:
+@pytest.mark.parametrize("name", ["planar-arm", "pr2", "iiwa14", "panda"])
+def test_arms_reach_and_press(name: str) -> None:
     assert_reaches_and_settles(check_robot(name))
 
 
