@@ -84,7 +84,8 @@ class RobotCheck:
         touch, the force changes until the controller has spread it.
         """
         threshold, (_, median, high) = self.scenario.mpc.force_threshold_N, self.settled_N
-        return abs(median - threshold) <= TOLERANCE * threshold and high <= LARGEST * threshold
+        close = abs(median - threshold) <= TOLERANCE * threshold
+        return bool(close and high <= LARGEST * threshold)
 
     def values(self) -> dict[str, Any]:
         """Returns all that is worth printing, in plain types."""

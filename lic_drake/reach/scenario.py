@@ -124,8 +124,8 @@ def parse_scenario(content: str | bytes, overrides: str = "", source: str = "sce
             raise ScenarioError(f"{source}: {key} must be a name, got {data.get(key)!r}")
     sampler = get_category(data["category"]).sampler
     robot = robot_path(data["robot"], source)
-    mpc, preset = data.get("mpc"), "haptic_mpc_2013"
-    arm = get_robot(robot)
+    arm, preset = get_robot(robot), "haptic_mpc_2013"
+    mpc: Any = data.get("mpc")
     if mpc is None or isinstance(mpc, dict):
         mpc = arm.mpc | (mpc or {})
         preset = mpc.pop("preset", preset)

@@ -35,12 +35,14 @@ _SNOPT: dict[str, float] = {"Major iterations limit": 50, "Major feasibility tol
 # From a plane this far behind the tip squares of distances are nearly linear, metres.
 _FAR_M = 10.0
 _DISTINCT_DIGITS = 5
-# Where the tip, a point ahead of it and one beside it may be in the frame that E is to be in.
+# The tip, a point ahead of it and one beside it, and their bounds in the frame that E is to be in.
 _INF = np.inf
-_POINTS = (
-    ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
-    ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (_INF, 0.0, 0.0)),
-    ((0.0, 1.0, 0.0), (-_INF, 0.0, 0.0), (_INF, _INF, 0.0)),
+_POINTS = np.array(
+    [
+        [(0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)],
+        [(1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (_INF, 0.0, 0.0)],
+        [(0.0, 1.0, 0.0), (-_INF, 0.0, 0.0), (_INF, _INF, 0.0)],
+    ]
 )
 _X_R = np.array([1.0, 0.0, 0.0])
 
