@@ -27,7 +27,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         remark(f"lic: error: {' '.join(str(error).split())}")
         return USER_ERROR
     except KeyboardInterrupt:
-        resumable = args.run in (collect.run, evaluate.run)
+        resumable = args.run in (collect.run, evaluate.run, robot.run_train)
         hint = "; finished environments are kept, run the same command to resume"
         remark(f"lic: interrupted{hint if resumable else ''}")
         return INTERRUPTED

@@ -1,14 +1,42 @@
-"""`lic robot`: looks at a robot before anything is collected with it."""
+"""`lic robot` looks at a robot; `lic train` makes it collect, learn and be evaluated."""
 
 import argparse
+import math
+import time
 from pathlib import Path
+from typing import Any
 
-from lic_drake.cli.arguments import INCOMPLETE, Subparsers, add_command, print_result, remark
+from lic_drake.cli.arguments import (
+    INCOMPLETE,
+    Subparsers,
+    add_command,
+    category_of,
+    print_result,
+    remark,
+    whole_number,
+    with_robot,
+    workers_of,
+)
 from lic_drake.errors import RenderingError, check_writable
+
+LEARNING = 0.6
+"""Share of a training's budget that is spent before the evaluation begins."""
+
+GOALS = 4
+"""Goals in each environment of a round, where it has so many."""
+
+LEAST, GROWTH = 8, 4
+"""Environments of the first round; later ones have 1 for so many before, but no fewer."""
+
+MANY = 10_000
+"""Environments that no evaluation by time comes to the end of."""
+
+METHODS = ("rnd", "cost", "gp")
+"""Strategies that an evaluation compares."""
 
 
 def add_parser(subparsers: Subparsers) -> None:
-    """Adds the subcommand and its action to the command line."""
+    """Adds both subcommands to the command line."""
     parser = subparsers.add_parser(
         "robot",
         help="check a robot of your own",
@@ -35,6 +63,26 @@ def add_parser(subparsers: Subparsers) -> None:
         type=Path,
         help="write a still of the robot pressing on the wall there (default: none)",
     )
+    train = add_command(
+        subparsers,
+        "train",
+        run_train,
+        "collect, learn and evaluate within a budget",
+        "Reaches in rounds of new environments, from starts that COST proposes in the first round"
+        " and then the estimate that was learned so far; after 60 % of the budget, compares RND,"
+        " COST and the estimate on unseen environments. Leaves a library, a table and a"
+        " demonstration. Run again, it goes on where it was, with a budget of minutes for as many"
+        " more.",
+        "lic train out/mine --robot mine.yaml --minutes 10",
+        ["--robot", "--category", "--set", "--workers", "--scheduler", "--json"],
+    )
+    train.add_argument("out", metavar="FOLDER", type=Path, help="folder to write to")
+    budget = train.add_mutually_exclusive_group(required=True)
+    for name, text in (
+        ("--minutes", "time for learning and evaluation"),
+        ("--reaches", "number of reaches, about, instead of a time"),
+    ):
+        budget.add_argument(name, metavar="N", type=whole_number(1), help=text)
 
 
 def run_check(args: argparse.Namespace) -> int:
@@ -60,3 +108,73 @@ def run_check(args: argparse.Namespace) -> int:
             remark(f"lic: no still: {error}")
     print_result(args, values)
     return 0 if check.reaches and check.settles else INCOMPLETE
+
+
+def run_train(args: argparse.Namespace) -> int:
+    """Collects actively, evaluates, demonstrates, and prints the table."""
+    from lic_drake.evaluate.table import format_rates, summarize_trials
+    from lic_drake.evaluate.trial import Evaluation, run_evaluation
+    from lic_drake.evaluate.trials import TrialTable
+    from lic_drake.experience.schema import write_atomically
+    from lic_drake.experience.store import ExperienceLibrary
+    from lic_drake.reach.scenario import load_scenario
+    from lic_drake.show.demonstration import demonstrate
+
+    category, began_s = args.category or category_of(args.robot), time.monotonic()
+    overrides = with_robot(args.set, args.robot)
+    scenario = load_scenario(category, overrides)
+    library = ExperienceLibrary(args.out / "learning" / "reaches")
+
+    def is_spent(share: float) -> bool:
+        if args.minutes is not None:
+            return time.monotonic() - began_s >= share * 60.0 * args.minutes
+        return len(library.successes()) >= share * args.reaches
+
+    def evaluation(results: str, **values: Any) -> Evaluation:
+        return Evaluation(
+            experience=library.path,
+            results=args.out / results,
+            scenario_name=category,
+            overrides=overrides,
+            **values,
+        )
+
+    library.create()
+    library.check_scenario(scenario, "the training")
+    with workers_of(args) as workers:
+        while not is_spent(LEARNING):
+            held = len(library.successes())
+            tried = 1 + int(library.columns()["environment"].max()) if held else 0
+            method, environments = "gp" if held else "cost", max(LEAST, tried // GROWTH)
+            remark(f"{held} reaches; up to {environments} environments with {method}")
+            round_ = evaluation(
+                "learning",
+                methods=(method,),
+                stream="training",
+                first=tried,
+                environments=environments,
+                goals=1 if scenario.task.goal_area is None else GOALS,
+                attempts=1,  # The library is of reaches into untouched environments.
+                variant=f"from environment {tried}",
+            )
+            run_evaluation(round_, workers, say=remark, is_over=lambda: is_spent(LEARNING))
+        remark(f"{len(library.successes())} reaches; {', '.join(METHODS)} on unseen environments")
+        most = MANY
+        if args.reaches is not None:
+            most = math.ceil((1.0 - LEARNING) * args.reaches / (2 * len(METHODS)))
+        compared = evaluation("evaluation", methods=METHODS, environments=most, goals=1)
+        over = (lambda: is_spent(1.0)) if args.reaches is None else (lambda: False)
+        rows = run_evaluation(compared, workers, say=remark, is_over=over)
+    rates = summarize_trials(TrialTable(rows), compared.attempts)
+    text, table = format_rates(rates), args.out / "table.md"
+    write_atomically(table, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+    shown = demonstrate(scenario, library, "gp", 0, args.out / "demo", say=remark)
+    values = {
+        "library": str(library.path),
+        "reaches": library.num_reaches,
+        "table": str(table),
+        "rates": rates,
+        "demo": str(shown.files["recording"]),
+    }
+    print_result(args, values, f"{text}library: {values['library']}\ndemo: {values['demo']}")
+    return 0

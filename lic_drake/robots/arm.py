@@ -85,7 +85,7 @@ class Arm:
         q_min: Vector | None = None,
         q_max: Vector | None = None,
         held: Mapping[str, float] | None = None,
-        carriage: tuple[str, str, str] | None = None,
+        carriage: Sequence[str] | None = None,
         height_range_m: tuple[float, float] = (-np.inf, np.inf),
         is_planar: bool = False,
         home: Mapping[str, float] | None = None,

@@ -7,7 +7,7 @@ is fixed in it, and the hand points along Ex of the tip.
 import hashlib
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 from itertools import chain
 from pathlib import Path
@@ -247,10 +247,6 @@ def _read(content: bytes, path: Path) -> Arm:
     for key, none in (("skin_links", "all"), ("carriage", "add")):
         if data.get(key) == none:
             data[key] = []
-    known = [item.name for item in fields(RobotFile)]
-    for key in data:
-        if key not in known:
-            raise ScenarioError(f"{source}: unknown key {key!r}; known: {', '.join(known)}")
     robot = read_section(RobotFile, data, source)
     model = _find_model(robot.model, path)
     identity = repr(asdict(robot)).encode() + model.read_bytes()
@@ -262,9 +258,7 @@ def _read(content: bytes, path: Path) -> Arm:
             tip_frame=_TIP,
             skin_links=robot.skin_links or None,
             held={name: j.held for name, j in robot.joints.items() if j.held is not None},
-            carriage=(robot.carriage[0], robot.carriage[1], robot.carriage[2])
-            if robot.carriage
-            else None,
+            carriage=robot.carriage or None,
             height_range_m=(robot.height_range_m[0], robot.height_range_m[1]),
             home={name: math.radians(j.home_deg) for name, j in robot.joints.items()},
             digest=f"{path.stem}-{hashlib.sha256(identity).hexdigest()[:12]}",
