@@ -7,6 +7,8 @@ import pytest
 from support.six_joint_arm import write
 
 from lic_drake.cli.main import main
+from lic_drake.evaluate.trials import read_trials
+from lic_drake.experience.store import ExperienceLibrary
 
 
 @pytest.mark.usefixtures("_renderer")
@@ -28,3 +30,25 @@ def test_a_bad_file_is_one_line_and_exit_code_2(
     assert main(["robot", "check", str(path)]) == 2
     output, error = capsys.readouterr()
     assert output == "" and len(error.splitlines()) == 1 and "base: frame 'pillar'" in error
+
+
+def test_training_learns_evaluates_and_goes_on_where_it_was(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["train", str(tmp_path), "--reaches", "60", "--workers", "1", "--json"]
+    assert main(command) == 0
+    values = json.loads(capsys.readouterr().out)
+    reaches = ExperienceLibrary(values["library"]).columns()
+    # 8 environments with 4 goals by COST, then one by the estimate.
+    assert len(reaches["key"]) == values["reaches"] == 36
+    assert set(reaches["stream"]) == {"training"} and set(reaches["attempt"]) == {1}
+    rounds = read_trials(tmp_path / "learning" / "trials.parquet")
+    assert [row.method for row in rounds] == ["cost"] * 32 + ["gp"] * 4
+    assert {(rate["method"], rate["trials"]) for rate in values["rates"]} == {
+        (method, 4) for method in ("rnd", "cost", "gp")
+    }
+    assert "| gp | 2 |" in Path(values["table"]).read_text()
+    assert Path(values["demo"]).stat().st_size > 10_000
+    more = [*command[:3], "80", *command[4:]]
+    assert main(more) == 0
+    assert json.loads(capsys.readouterr().out)["reaches"] == 48
