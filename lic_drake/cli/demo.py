@@ -87,10 +87,17 @@ def run(args: argparse.Namespace) -> int:
     overrides = args.set or ("{clutter: {num_blocked: 8}}" if category == _SPHERES else "")
     # In foliage, experience comes from spheres: the demonstration is about transfer (paper V-B).
     learned = _SPHERES if foliage else category
-    library = ExperienceLibrary(args.library or shipped_library(learned, "" if own else args.robot))
-    scenario = parse_scenario(scenario_text(library.scenario()), overrides, source="--set")
+    path = args.library or shipped_library(learned, "" if own else args.robot)
+    if args.library is None and not path.exists():
+        raise LicError(
+            f"no experience of {args.robot} in {learned} is shipped; make some with: lic train"
+            f" out/mine --robot {args.robot} --minutes 10, and add --library out/mine/learning/reaches"
+        )
+    library = ExperienceLibrary(path)
+    scenario = library.scenario()
     if args.robot and get_robot(args.robot).digest != scenario.arm().digest:
         raise LicError(f"{library.path} is for --robot {scenario.robot}, not {args.robot}")
+    scenario = parse_scenario(scenario_text(scenario), overrides, source="--set")
     if foliage:
         scenario = load_scenario(category, with_robot(overrides, scenario.robot))
     if meshes and scenario.robot != "pr2":

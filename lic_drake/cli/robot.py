@@ -79,8 +79,8 @@ def add_parser(subparsers: Subparsers) -> None:
     train.add_argument("out", metavar="FOLDER", type=Path, help="folder to write to")
     budget = train.add_mutually_exclusive_group(required=True)
     for name, text in (
-        ("--minutes", "time for learning and evaluation"),
-        ("--reaches", "number of reaches, about, instead of a time"),
+        ("--minutes", "time for learning and evaluation, minutes (no default: this or --reaches)"),
+        ("--reaches", "number of reaches, about (no default: this or --minutes)"),
     ):
         budget.add_argument(name, metavar="N", type=whole_number(1), help=text)
 

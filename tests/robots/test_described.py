@@ -72,7 +72,7 @@ def test_a_scenario_finds_the_file_beside_itself_and_knows_its_content(tmp_path:
         ("carriage: add", "carriage: [x, y]", "carriage must be add, or the joints along"),
         ("carriage: add", "carriage: [x, y, z]", "'x'"),
         ("[0.0, 0.4]", "[0.4, 0.0]", "height_range_m must be [least, most]"),
-        ("carriage: add", "wheels: 3", "unknown key 'wheels'; known: model, base"),
+        ("carriage: add", "wheels: 3", "['wheels'] were unknown"),
         ("carriage: add", "carriage: {", "not YAML"),
     ],
 )
