@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from lic_drake.config import read_mapping
 from lic_drake.errors import LibraryError, RequestError, quoted, readable_errors
-from lic_drake.experience.runner import Progress, simulate
+from lic_drake.experience.runner import Progress, simulate_locked
 from lic_drake.experience.schema import write_atomically
 from lic_drake.experience.store import ExperienceLibrary, parse_same_scenario
 from lic_drake.experience.workers import Workers
@@ -126,11 +126,12 @@ def collect(
     An existing library accepts only its own request, or that with more environments.
     """
     library.create()
-    # All shares of a job array may start at the same time.
-    with library.locked(share), FileLock(library.path / "_collection.lock"):
-        _record_request(library, request)
-    reaches, total = request.all_reaches(share), request.num_reaches(share)
-    return simulate(reaches, library, workers, total=total, share=share, **options)
+    with library.locked(share):
+        # All shares of a job array may start at the same time.
+        with FileLock(library.path / "_collection.lock"):
+            _record_request(library, request)
+        reaches, total = request.all_reaches(share), request.num_reaches(share)
+        return simulate_locked(reaches, library, workers, total=total, **options)
 
 
 def _record_request(library: ExperienceLibrary, request: CollectionRequest) -> None:

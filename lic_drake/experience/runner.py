@@ -82,21 +82,19 @@ def simulate(
     workers: Workers | None = None,
     *,
     total: int = 0,
-    share: str = "1/1",
     reach: ReachFunction = run_reach,
     progress: Callable[[Progress], None] = lambda progress: None,
 ) -> Progress:
     """Simulates the requests that a library lacks, and returns the final state.
 
-    Apart from wall times, the result depends neither on the workers nor on interruptions. Finished
-    shards are kept whatever is raised.
+    The library is locked meanwhile. Apart from wall times, the result depends neither on the
+    workers nor on interruptions. Finished shards are kept whatever is raised.
 
     Args:
         requests: Requests of one scenario, grouped by environment.
         library: A folder; created if absent.
         workers: Where to simulate; by default in this process.
         total: Number of requests, for the progress.
-        share: The part k/n of a collection that this run covers, see `ExperienceLibrary.locked`.
         reach: Simulates a request.
         progress: Called about twice a second.
 
@@ -105,6 +103,22 @@ def simulate(
         ClusterError: The cluster cannot be used.
     """
     library.create()
+    with library.locked():
+        return simulate_locked(
+            requests, library, workers, total=total, reach=reach, progress=progress
+        )
+
+
+def simulate_locked(
+    requests: Iterable[ReachRequest],
+    library: ExperienceLibrary,
+    workers: Workers | None = None,
+    *,
+    total: int = 0,
+    reach: ReachFunction = run_reach,
+    progress: Callable[[Progress], None] = lambda progress: None,
+) -> Progress:
+    """Does the same in a library whose lock the caller holds, see `ExperienceLibrary.locked`."""
     state = Progress(total=total)
     began_s = time.monotonic()
 
@@ -137,10 +151,7 @@ def simulate(
         state.done += len(records)
         state.successes += sum(record.success for record in records)
 
-    with library.locked(share):
-        state.failed = run_tasks(
-            tasks(), simulate_environment, workers or Workers(), finish, report
-        )
+    state.failed = run_tasks(tasks(), simulate_environment, workers or Workers(), finish, report)
     state.at_work, state.elapsed_s = 0, time.monotonic() - began_s
     return state
 

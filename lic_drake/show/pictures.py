@@ -132,7 +132,7 @@ def _sequence_page(
         embed(recording.html(), height_px=540),
     ]
     if "film" in files:
-        words = "Both attempts, twice as fast, from the right and from behind the board"
+        words = "All attempts, twice as fast, from the right and from behind the board"
         parts.append(picture(files["film"].read_bytes(), "image/webp", words))
     for number, attempt in enumerate(attempts, start=1):
         words = f"Look {number}: open apertures, passable probabilities and goal. Attempt {number}:"

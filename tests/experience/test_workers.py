@@ -15,7 +15,7 @@ from support.light_tasks import count_threads, deaths_of, work
 from lic_drake.cli.main import main
 from lic_drake.errors import ClusterError
 from lic_drake.experience.check import check_library
-from lic_drake.experience.collect import REQUEST_FILE, collect
+from lic_drake.experience.collect import collect
 from lic_drake.experience.runner import Progress, ReachFunction, Task, run_tasks
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.experience.workers import DaskWorkers, LocalWorkers, Workers
@@ -106,10 +106,7 @@ def test_of_concurrent_collections_shares_fill_one_library_and_any_other_is_reje
     hold = tmp_path / "hold"
     hold.touch()
     first = start(library.path, replace(reach, hold=hold), "--workers", "1", "--share", "1/2")
-    share, request = library.path / "_collecting-1-of-2.lock", library.path / "_collection.lock"
-    # First both are held, to write the request; then the share's alone, until all is done.
-    wait_until(lambda: (library.path / REQUEST_FILE).exists())
-    wait_until(lambda: is_held(share) and not is_held(request))
+    wait_until(lambda: is_held(library.path / "_collecting-1-of-2.lock"))
     for other in ("1/1", "1/2", "1/3"):
         assert main(["collect", str(library.path), *OPTIONS, "--share", other]) == 2
         assert f"another process is adding to {library.path} (it holds" in capsys.readouterr().err
