@@ -83,15 +83,16 @@ def run(args: argparse.Namespace) -> int:
 
     category = args.category or category_of(args.robot)
     foliage, meshes = category == _FOLIAGE, args.visuals == "drake_models"
-    own = load_scenario(category).robot == args.robot
+    # Libraries of a robot other than the category's own have its name, too.
+    robot = "" if load_scenario(category).robot == args.robot else args.robot
     overrides = args.set or ("{clutter: {num_blocked: 8}}" if category == _SPHERES else "")
     # In foliage, experience comes from spheres: the demonstration is about transfer (paper V-B).
     learned = _SPHERES if foliage else category
-    path = args.library or shipped_library(learned, "" if own else args.robot)
+    path = args.library or shipped_library(learned, robot)
     if args.library is None and not path.exists():
         raise LicError(
-            f"no experience of {args.robot} in {learned} is shipped; make some with: lic train"
-            f" out/mine --robot {args.robot} --minutes 10, and add --library out/mine/learning/reaches"
+            f"no experience of {robot} in {learned} is shipped; make some with: lic train out/mine"
+            f" --robot {robot} --minutes 10, and add --library out/mine/learning/reaches"
         )
     library = ExperienceLibrary(path)
     scenario = library.scenario()
@@ -102,12 +103,12 @@ def run(args: argparse.Namespace) -> int:
         scenario = load_scenario(category, with_robot(overrides, scenario.robot))
     if meshes and scenario.robot != "pr2":
         raise LicError(f"--visuals drake_models is for --robot pr2, not {scenario.robot}; omit it")
-    seed = _SEEDS.get(category, 0) if args.seed is None else args.seed
+    default = _SEEDS.get(shipped_library(category, robot).name, 0)
     result = demonstrate(
         scenario,
         library,
         args.method,
-        seed,
+        default if args.seed is None else args.seed,
         args.out,
         drake_models=find_drake_models() if meshes else None,
         cameras=load_cameras("foliage") if foliage else None,

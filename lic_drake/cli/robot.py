@@ -1,10 +1,7 @@
 """`lic robot` looks at a robot; `lic train` makes it collect, learn and be evaluated."""
 
 import argparse
-import math
-import time
 from pathlib import Path
-from typing import Any
 
 from lic_drake.cli.arguments import (
     INCOMPLETE,
@@ -18,21 +15,6 @@ from lic_drake.cli.arguments import (
     workers_of,
 )
 from lic_drake.errors import RenderingError, check_writable
-
-LEARNING = 0.6
-"""Share of a training's budget that is spent before the evaluation begins."""
-
-GOALS = 4
-"""Goals in each environment of a round, where it has so many."""
-
-LEAST, GROWTH = 8, 4
-"""Environments of the first round; later ones have 1 for so many before, but no fewer."""
-
-MANY = 10_000
-"""Environments that no evaluation by time comes to the end of."""
-
-METHODS = ("rnd", "cost", "gp")
-"""Strategies that an evaluation compares."""
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -111,64 +93,27 @@ def run_check(args: argparse.Namespace) -> int:
 
 
 def run_train(args: argparse.Namespace) -> int:
-    """Collects actively, evaluates, demonstrates, and prints the table."""
+    """Trains, demonstrates, and prints the table."""
     from lic_drake.evaluate.table import format_rates, summarize_trials
-    from lic_drake.evaluate.trial import Evaluation, run_evaluation
+    from lic_drake.evaluate.training import train, training_library
     from lic_drake.evaluate.trials import TrialTable
     from lic_drake.experience.schema import write_atomically
-    from lic_drake.experience.store import ExperienceLibrary
-    from lic_drake.reach.scenario import load_scenario
     from lic_drake.show.demonstration import demonstrate
 
-    category, began_s = args.category or category_of(args.robot), time.monotonic()
-    overrides = with_robot(args.set, args.robot)
-    scenario = load_scenario(category, overrides)
-    library = ExperienceLibrary(args.out / "learning" / "reaches")
-
-    def is_spent(share: float) -> bool:
-        if args.minutes is not None:
-            return time.monotonic() - began_s >= share * 60.0 * args.minutes
-        return len(library.successes()) >= share * args.reaches
-
-    def evaluation(results: str, **values: Any) -> Evaluation:
-        return Evaluation(
-            experience=library.path,
-            results=args.out / results,
-            scenario_name=category,
-            overrides=overrides,
-            **values,
-        )
-
-    library.create()
-    library.check_scenario(scenario, "the training")
     with workers_of(args) as workers:
-        while not is_spent(LEARNING):
-            held = len(library.successes())
-            tried = 1 + int(library.columns()["environment"].max()) if held else 0
-            method, environments = "gp" if held else "cost", max(LEAST, tried // GROWTH)
-            remark(f"{held} reaches; up to {environments} environments with {method}")
-            round_ = evaluation(
-                "learning",
-                methods=(method,),
-                stream="training",
-                first=tried,
-                environments=environments,
-                goals=1 if scenario.task.goal_area is None else GOALS,
-                attempts=1,  # The library is of reaches into untouched environments.
-                variant=f"from environment {tried}",
-            )
-            run_evaluation(round_, workers, say=remark, is_over=lambda: is_spent(LEARNING))
-        remark(f"{len(library.successes())} reaches; {', '.join(METHODS)} on unseen environments")
-        most = MANY
-        if args.reaches is not None:
-            most = math.ceil((1.0 - LEARNING) * args.reaches / (2 * len(METHODS)))
-        compared = evaluation("evaluation", methods=METHODS, environments=most, goals=1)
-        over = (lambda: is_spent(1.0)) if args.reaches is None else (lambda: False)
-        rows = run_evaluation(compared, workers, say=remark, is_over=over)
-    rates = summarize_trials(TrialTable(rows), compared.attempts)
+        rows = train(
+            args.out,
+            args.category or category_of(args.robot),
+            with_robot(args.set, args.robot),
+            minutes=args.minutes,
+            reaches=args.reaches,
+            workers=workers,
+            say=remark,
+        )
+    library, rates = training_library(args.out), summarize_trials(TrialTable(rows), attempts=2)
     text, table = format_rates(rates), args.out / "table.md"
     write_atomically(table, lambda temporary: temporary.write_text(text, encoding="utf-8"))
-    shown = demonstrate(scenario, library, "gp", 0, args.out / "demo", say=remark)
+    shown = demonstrate(library.scenario(), library, "gp", 0, args.out / "demo", say=remark)
     values = {
         "library": str(library.path),
         "reaches": library.num_reaches,

@@ -162,13 +162,13 @@ def run_evaluation(
     evaluation: Evaluation,
     workers: Workers | None = None,
     say: Callable[[str], None] = print,
-    is_over: Callable[[], bool] = lambda: False,
+    is_over: Callable[[], bool] | None = None,
 ) -> list[TrialRow]:
     """Runs every strategy on the same goals in the same environments.
 
     Stored reaches are reused; selections are always recomputed. The file of trials also keeps those
     of other variants and strategies. `say` receives progress messages. When `is_over`, no further
-    environment is begun but the first.
+    environment is begun but the first: `environments` are then as many as there may be.
 
     Raises:
         LicError: A method is unknown, a library cannot be read or written, or an environment
@@ -200,10 +200,8 @@ def run_evaluation(
         now_s = time.perf_counter()
         if now_s >= said_s + SAY_S or done == count:
             said_s, left_s = now_s, (now_s - began_s) * (count - done) / done
-            say(
-                f"  {done}/{count} environments, {len(rows)} attempts, {left_s:.0f} s left; kept in"
-                f" {library.path}"
-            )
+            of, left = ("", "") if is_over else (f"/{count}", f", {left_s:.0f} s left")
+            say(f"  {done}{of} environments, {len(rows)} attempts{left}; kept in {library.path}")
 
     with library.locked():
         known: defaultdict[int, list[ReachRecord]] = defaultdict(list)
@@ -212,7 +210,7 @@ def run_evaluation(
         tasks = (
             Task(shard_name(evaluation.stream, i), (*shared, i, known.pop(i, [])))
             for i in range(evaluation.first, evaluation.first + count)
-            if i == evaluation.first or not is_over()
+            if i == evaluation.first or is_over is None or not is_over()
         )
         refuse_failed(run_tasks(tasks, _try_environment, workers or Workers(), finish))
         library.compact()
