@@ -130,7 +130,7 @@ def check_robot(name: str) -> RobotCheck:
     task = f"{{torso_m: {0.5 * (low + high)}, stand: null}}"
     scenario = load_scenario(shipped, f"{{robot: {name!r}, task: {task}, stop: {stop}}}")
     b0 = scenario.task.b0
-    touching = CollisionChecker(arm, join(), scenario.scene).touching_links(b0, arm.q_home)
+    touching = CollisionChecker(arm, join()).touching_links(b0, arm.q_home)
     if touching:
         raise ScenarioError(
             f"{arm.name} touches itself in its home posture: {', '.join(touching)}; give another"

@@ -179,12 +179,7 @@ class Kinematics:
         roll. The cost is Eq. (5), by wrist and elbow behind the tip, or the distance from `near`.
         """
         ik = InverseKinematics(self._plant, self._context, with_joint_limits=False)
-        program, q, world, zeros = (
-            ik.get_mutable_prog(),
-            ik.q(),
-            self._plant.world_frame(),
-            np.zeros(3),
-        )
+        program, q, world = ik.get_mutable_prog(), ik.q(), self._plant.world_frame()
         program.AddBoundingBoxConstraint(self.q_min, self.q_max, q)
         for p_EQ, low, high in _POINTS[:points]:
             ik.AddPositionConstraint(
@@ -198,7 +193,7 @@ class Kinematics:
         if near is None:
             p_RF, C = X_RE.translation() - _FAR_M * _X_R, np.diag([0.5 / _FAR_M, 0.0, 0.0])
             for link in (self._links[-1], self._links[len(self._links) // 2]):
-                cost = PositionCost(self._plant, world, p_RF, link, zeros, C, self._context)
+                cost = PositionCost(self._plant, world, p_RF, link, np.zeros(3), C, self._context)
                 program.AddCost(cost, q)
             seeds = self._seeds(X_RE, points)
         else:

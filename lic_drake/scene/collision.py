@@ -9,8 +9,12 @@ from pydrake.systems.framework import Context, DiagramBuilder
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.robots.arm import Arm
+from lic_drake.scene.contact import ContactConfig
 from lic_drake.scene.scene import Scene, SceneConfig, add_scene
 from lic_drake.types import Vector
+
+# Collisions are those of the shapes: fine contact meshes of a thick arm take 300 MB and seconds.
+_COARSE = SceneConfig(contact=ContactConfig(skin_mesh_m=1.0, object_mesh_m=1.0))
 
 
 def is_touching(scene: Scene, root: Context) -> bool:
@@ -35,11 +39,11 @@ class CollisionChecker:
         plant_context: Its context, in which `touches` sets positions.
     """
 
-    def __init__(self, arm: Arm, instance: ClutterInstance, config: SceneConfig) -> None:
+    def __init__(self, arm: Arm, instance: ClutterInstance) -> None:
         self._arm = arm
         builder = DiagramBuilder()
         fixed = replace(instance.subset(np.flatnonzero(~instance.movable)), stems=None)
-        self._scene = add_scene(builder, arm, fixed, config, mobile=True)
+        self._scene = add_scene(builder, arm, fixed, _COARSE, mobile=True)
         others = GeometrySet([*self._scene.objects, *self._scene.body])
         self._scene.scene_graph.collision_filter_manager().Apply(
             CollisionFilterDeclaration().ExcludeWithin(others)
