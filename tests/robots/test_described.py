@@ -15,7 +15,7 @@ SPHERES = "sphere-aperture-clutter"
 
 def test_one_file_makes_an_arm(tmp_path: Path) -> None:
     arm = get_robot(str(write(tmp_path)))
-    assert (arm.name, arm.num_joints) == ("six-joint-arm", 6)
+    assert (arm.name, arm.num_joints) == ("six_joint_arm", 6)
     assert arm.link_names == ("upper_arm", "forearm", "roll", "wrist", "hand")
     assert {shape.kind for shape in arm.skin} == {"capsule"}
     np.testing.assert_allclose(arm.calc_pose(np.zeros(6)).p_RE, [1.02, -0.2, 0.78], atol=1e-12)
@@ -52,9 +52,17 @@ def test_a_scenario_finds_the_file_beside_itself_and_knows_its_content(tmp_path:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("model: arm.urdf", "model: none.urdf", "none.urdf is no URDF or SDF file; give its path"),
-        ("model: arm.urdf", "", "model must be a URDF or SDF file"),
-        ("model: arm.urdf", "model: package://no/arm.urdf", "cannot find package://no/arm.urdf"),
+        (
+            "model: six_joint_arm.urdf",
+            "model: none.urdf",
+            "none.urdf is no URDF or SDF file; give its path",
+        ),
+        ("model: six_joint_arm.urdf", "", "model must be a URDF or SDF file"),
+        (
+            "model: six_joint_arm.urdf",
+            "model: package://no/arm.urdf",
+            "cannot find package://no/arm.urdf",
+        ),
         ("frame: column", "frame: pillar", "base: frame 'pillar' is not in the model; it has"),
         ("frame: hand", "frame: gripper", "tip: frame 'gripper' is not in the model; it has"),
         ("xyz: [0.0, -0.2, 0.7]", "xyz: [0.0, -0.2]", "xyz must be 3 finite numbers"),
@@ -112,5 +120,5 @@ def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
 
 def test_joints_too_stiff_for_the_controller_are_refused(tmp_path: Path) -> None:
     path = write(tmp_path, "stiffness: 30.0", "stiffness: 3000.0")
-    with pytest.raises(ScenarioError, match="forearm_joint of six-joint-arm, 3000 Nm/rad, is too"):
+    with pytest.raises(ScenarioError, match="forearm_joint of six_joint_arm, 3000 Nm/rad, is too"):
         load_scenario(SPHERES, f"{{robot: {path}}}")
