@@ -156,10 +156,12 @@ def test_five_thousand_reaches_need_no_more_memory_than_five_hundred() -> None:
 
 
 @pytest.mark.slow
-def test_three_hundred_reaches_of_the_pr2_need_no_more_memory_than_a_hundred() -> None:
-    scenario = load_scenario(
-        "sphere-aperture-clutter", "{clutter: {num_blocked: 10}, stop: {timeout_s: 2.0}}"
-    )
+@pytest.mark.parametrize("robot", ["pr2", "iiwa14", "panda"])
+def test_three_hundred_reaches_before_a_board_need_no_more_memory_than_a_hundred(
+    robot: str,
+) -> None:
+    overrides = f"{{robot: {robot}, clutter: {{num_blocked: 10}}, stop: {{timeout_s: 2.0}}}}"
+    scenario = load_scenario("sphere-aperture-clutter", overrides)
     requests = random_requests(scenario, "training", 60, 5)
     session = ReachSession()
     growth = growth_mb(lambda i: session.run(requests[i]), 100, 300)

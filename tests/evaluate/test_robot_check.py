@@ -38,7 +38,8 @@ def test_an_arm_that_touches_itself_at_home_is_refused(tmp_path: Path) -> None:
         check_robot(str(path))
 
 
-@pytest.mark.parametrize("name", ["iiwa14", "panda"])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["pr2", "iiwa14", "panda"])
 def test_in_free_space_the_tip_comes_within_a_centimetre_of_its_goals(name: str) -> None:
     overrides = f"{{robot: {name}, stop: {{success_distance_m: 0.01}}, mpc: {{deadzone_m: 0.0}}}}"
     scenario = load_scenario("sphere-aperture-clutter", overrides)
@@ -46,8 +47,9 @@ def test_in_free_space_the_tip_comes_within_a_centimetre_of_its_goals(name: str)
     environment = Environment(scenario, join(), sleep=False)
     x0 = arm.tip_pose(arm.q_home) + np.pad(b0, (0, 4))
     rng = np.random.default_rng(0)
-    places = x0[:3] - b0 + rng.uniform([0.0, -0.3, -0.3], [0.3, 0.3, 0.2], (8, 3))
+    places = x0[:3] - b0 + rng.uniform([0.0, -0.3, -0.3], [0.3, 0.3, 0.2], (100, 3))
     found = arm.solve_pointing(places, np.array([1.0, 0.0, 0.0]))
     goals = [place + b0 for place, q in zip(places, found, strict=True) if len(q)]
     reached = [environment.reach(p_WG, x0, q=arm.q_home).outcome == "reached" for p_WG in goals]
-    assert len(goals) > 3 and np.mean(reached) >= 0.95
+    print(f"{name}: {sum(reached)} of {len(goals)}")
+    assert len(goals) > 50 and np.mean(reached) >= 0.95
