@@ -8,13 +8,15 @@ from lic_drake.errors import LicError
 
 VARIABLE = "LIC_EXTENSIONS"
 """Environment variable with the names of modules to import, separated by commas."""
+GROUP = "lic_drake"
+"""Entry points of installed packages: modules to import, see notebooks/extend.ipynb."""
 
 
 class Registry[T]:
     """Categories, robots or estimators by name.
 
-    A lookup first imports the modules in `LIC_EXTENSIONS`, so that the command line and worker
-    processes, which inherit the environment, know their entries.
+    A lookup first imports the entry points of installed packages and the modules in
+    `LIC_EXTENSIONS`, so that the command line and worker processes know their entries, too.
     """
 
     def __init__(self, kind: str, error: type[LicError]) -> None:
@@ -63,7 +65,17 @@ class Registry[T]:
 
 @cache
 def load_extensions() -> None:
-    """Imports the modules in `LIC_EXTENSIONS`, once per process; a LicError names one it cannot."""
+    """Imports what registers further entries, once per process; a LicError names what it cannot."""
+    from importlib.metadata import entry_points
+
+    for point in entry_points(group=GROUP):
+        try:
+            point.load()
+        except (ImportError, AttributeError) as error:
+            raise LicError(
+                f"the entry point {point.name} = {point.value} of an installed package cannot be"
+                f" imported ({error}); mend that package or uninstall it"
+            ) from error
     for name in filter(None, map(str.strip, os.environ.get(VARIABLE, "").split(","))):
         try:
             import_module(name)

@@ -1,6 +1,8 @@
 """What the registries accept and refuse."""
 
 import dataclasses
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -140,3 +142,23 @@ def test_an_extension_that_cannot_be_imported_is_named(monkeypatch: pytest.Monke
             load_extensions()
     monkeypatch.undo()
     load_extensions.cache_clear()
+
+
+def test_entry_points_of_installed_packages_are_imported(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.delenv("LIC_EXTENSIONS", raising=False)
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "theirs.py").write_text("import sys; sys.theirs_was_imported = True")
+    installed = tmp_path / "theirs-1.0.dist-info"
+    installed.mkdir()
+    (installed / "METADATA").write_text("Metadata-Version: 2.1\nName: theirs\nVersion: 1.0\n")
+    for value in ("theirs", "theirs:nothing"):
+        (installed / "entry_points.txt").write_text(f"[lic_drake]\nshelves = {value}\n")
+        load_extensions.cache_clear()
+        if value == "theirs":
+            load_extensions()
+            assert sys.theirs_was_imported  # type: ignore[attr-defined]
+        else:
+            with pytest.raises(LicError, match=r"shelves = theirs:nothing .* cannot be imported"):
+                load_extensions()

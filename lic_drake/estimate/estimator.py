@@ -28,6 +28,7 @@ class SuccessEstimator(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[mis
         gradient_step: Half width of the numerical gradient's central difference, in standard
             deviations of a feature; wide enough for piecewise constant estimates.
         scale_: Standard deviation of each feature, shape (d,).
+        solution_: What takes `fit` long even with given settings, shape (k,); None: nothing does.
     """
 
     gradient_step: float = 0.2
@@ -51,7 +52,19 @@ class SuccessEstimator(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[mis
         Raises:
             EstimateError: The rows are unusable.
         """
-        return self._learn(*check_rows(X, y, groups, sample_weight))
+        return self.resume(X, y, groups, sample_weight, solution=None)
+
+    def resume(
+        self,
+        X: ArrayLike,
+        y: ArrayLike,
+        groups: ArrayLike | None = None,
+        sample_weight: ArrayLike | None = None,
+        *,
+        solution: Vector | None,
+    ) -> Self:
+        """Fits as `fit` does, given the `solution_` of a fit to the same rows and settings."""
+        return self._learn(*check_rows(X, y, groups, sample_weight), solution)
 
     def conditioned_on(
         self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None
@@ -104,7 +117,10 @@ class SuccessEstimator(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[mis
         up, down = np.split(values[1:], 2)
         return float(values[0]), (up - down) / (2.0 * h)
 
-    def _learn(self, X: Vector, y: Vector, groups: Any, weight: Vector) -> Self:
+    def _learn(
+        self, X: Vector, y: Vector, groups: Any, weight: Vector, solution: Vector | None = None
+    ) -> Self:
+        self.solution_ = solution
         self._fit(X, y, groups, weight)
         self.classes_ = np.array([0.0, 1.0])
         self.n_features_in_ = X.shape[1]

@@ -79,7 +79,8 @@ class GaussianProcess(SuccessEstimator):
         with threadpool_limits(limits=1, user_api="blas"):
             if chosen is None:
                 chosen = _choose_settings(X, y, weight, selection_folds(groups, len(y)))
-            self._posterior = Posterior(rows, chosen)
+            self._posterior = Posterior(rows, chosen, self.solution_)
+        self.solution_ = self._posterior.solution
         self.hyperparameters_ = chosen
 
     def _values(self, X: Vector) -> Vector:
@@ -96,24 +97,37 @@ class GaussianProcess(SuccessEstimator):
 
 
 class Posterior:
-    """The process conditioned on m rows: `alpha` is C^-1 (rate - mu), `prior_mean` mu."""
+    """The process conditioned on m rows: `alpha` is C^-1 (rate - mu), `prior_mean` mu.
 
-    def __init__(self, rows: AveragedRows, prior: Hyperparameters) -> None:
+    `solution` has both, shape (m + 1,), and is not worked out again if it is given.
+    """
+
+    def __init__(
+        self, rows: AveragedRows, prior: Hyperparameters, solution: Vector | None = None
+    ) -> None:
         self.X, self.prior = rows.X, prior
-        covariance = prior.signal_variance * l1_correlation(rows.X, rows.X, prior.theta)
-        noise = prior.reach_variance / rows.count + prior.noise_floor
-        covariance[np.diag_indices(len(rows.X))] += noise
-        factor = cho_factor(covariance, lower=True, overwrite_a=True, check_finite=False)
-        targets = np.column_stack([rows.rate, np.ones(len(rows.rate))])
-        weights = cho_solve(factor, targets, check_finite=False)
-        self.prior_mean = float(weights[:, 0].sum() / weights[:, 1].sum())
-        self.alpha = weights[:, 0] - self.prior_mean * weights[:, 1]
+        if solution is None or len(solution) != len(rows.X) + 1:
+            solution = _solve(rows, prior)
+        self.solution = solution
+        self.alpha, self.prior_mean = solution[:-1], float(solution[-1])
 
     def mean(self, X: Vector) -> Vector:
         """Returns the posterior mean for queries X, shape (n, d): shape (n,)."""
         covariance = l1_correlation(self.X, X, self.prior.theta)
         covariance *= self.prior.signal_variance
         return self.prior_mean + self.alpha @ covariance
+
+
+def _solve(rows: AveragedRows, prior: Hyperparameters) -> Vector:
+    """Returns alpha and, last, mu of a `Posterior`, shape (m + 1,)."""
+    covariance = prior.signal_variance * l1_correlation(rows.X, rows.X, prior.theta)
+    noise = prior.reach_variance / rows.count + prior.noise_floor
+    covariance[np.diag_indices(len(rows.X))] += noise
+    factor = cho_factor(covariance, lower=True, overwrite_a=True, check_finite=False)
+    targets = np.column_stack([rows.rate, np.ones(len(rows.rate))])
+    weights = cho_solve(factor, targets, check_finite=False)
+    mu = weights[:, 0].sum() / weights[:, 1].sum()
+    return np.append(weights[:, 0] - mu * weights[:, 1], mu)
 
 
 def l1_correlation(A: Vector, B: Vector, theta: Vector) -> Vector:

@@ -1,8 +1,8 @@
 """Fits are kept: what estimators chose from a library, in files, so that each is fitted once.
 
-Choosing settings (hyper-parameters, bandwidths) takes seconds, conditioning on rows with them a few
-hundredths: only settings are kept, as plain arrays, and a fit from them is the same bit for bit. A
-file is found by a digest of the rows themselves, of the features, and of the code that chooses.
+Choosing settings (hyper-parameters, bandwidths) takes seconds, and so does solving for the weights
+of thousands of rows: both are kept, as plain arrays, and a fit with them is the same bit for bit. A
+file is found by a digest of the rows themselves, of the features, and of the code that fits.
 """
 
 import hashlib
@@ -28,6 +28,7 @@ from lic_drake.estimate.registry import is_built_in
 VARIABLE = "LIC_CACHE"
 """Environment variable with the folder of kept fits, or "off"."""
 
+_SOLUTION = "solution_"
 _KINDS = {kind.__name__: kind for kind in (GaussianProcess, Hyperparameters, NearestNeighbours)}
 _CODE = [*sorted(Path(__file__).parent.glob("*.py")), Path(__file__).parents[1] / "seeds.py"]
 
@@ -60,10 +61,10 @@ def kept_path(name: str, features: FeatureMap, rows: ExperienceRows) -> Path | N
     return folder / f"{name}-{digest.hexdigest()}.npz"
 
 
-def read_settings(
-    path: Path, estimator: SuccessEstimator, num_features: int, say: Callable[[str], None]
-) -> dict[str, Any] | None:
-    """Returns constructor arguments that were kept for an unfitted estimator, None if none were.
+def fit_as_kept(
+    path: Path, estimator: SuccessEstimator, rows: ExperienceRows, say: Callable[[str], None]
+) -> bool:
+    """Fits an estimator to rows with what was kept of such a fit; returns whether anything was.
 
     A damaged or foreign file is not trusted; `say` receives a line about it.
     """
@@ -72,21 +73,27 @@ def read_settings(
             arrays = dict(file)
         if str(arrays.pop("kept_as")) != path.name:
             raise ValueError("it was kept under another name")
+        solution = arrays.pop(_SOLUTION, None)
         if {name.split(".")[0] for name in arrays} != set(estimator._chosen):
             raise ValueError(f"it holds {', '.join(arrays) or 'nothing'}")
         for name, array in arrays.items():
-            if array.shape not in ((), (num_features,)) or not np.all(np.isfinite(array)):
+            if array.shape not in ((), rows.X.shape[1:]) or not np.all(np.isfinite(array)):
                 raise ValueError(f"{name} has another shape, or is not finite")
-        return _from_arrays(arrays)
+        if solution is not None and not (solution.ndim == 1 and np.all(np.isfinite(solution))):
+            raise ValueError("the solution has another shape, or is not finite")
+        settings = _from_arrays(arrays)
     except FileNotFoundError:
-        return None
+        return False
     except Exception as error:  # Whatever is wrong with the file, it only costs a fit.
         say(f"lic: ignored the kept fit {path}: {' '.join(str(error).split())}")
-        return None
+        return False
+    estimator.set_params(**settings)
+    estimator.resume(rows.X, rows.y, sample_weight=rows.weight, solution=solution)
+    return True
 
 
-def keep_settings(path: Path, fitted: SuccessEstimator, say: Callable[[str], None]) -> None:
-    """Writes what a fit has chosen, atomically; `say` receives a line if that fails."""
+def keep_fit(path: Path, fitted: SuccessEstimator, say: Callable[[str], None]) -> None:
+    """Writes what a fit has worked out, atomically; `say` receives a line if that fails."""
     temporary = None
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -94,6 +101,8 @@ def keep_settings(path: Path, fitted: SuccessEstimator, say: Callable[[str], Non
         with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".tmp", delete=False) as file:
             temporary = file.name
             arrays: dict[str, Any] = {"kept_as": path.name, **_to_arrays(fitted.chosen)}
+            if fitted.solution_ is not None:
+                arrays[_SOLUTION] = fitted.solution_
             np.savez(file, **arrays)
         os.replace(temporary, path)
     except OSError as error:

@@ -223,8 +223,9 @@ class PartlyAsleep(Simulation):
         self._axes = SkinAxes(world.scenario.arm(), num_axes)
 
     def release(self) -> None:
-        """Leaves the rig that was used last to the cache."""
-        del self._rig, self._stepper
+        """Leaves the rig that was used last, if it came to one, to the cache."""
+        for name in ("_rig", "_stepper"):
+            self.__dict__.pop(name, None)
 
     def _go_on_in(self, rig: Rig, q: Vector) -> None:
         """Continues in another rig of the same arm, at the same time, with its controller."""
@@ -284,6 +285,7 @@ class SleepingObjects(PartlyAsleep):
         key, instance = self._asleep[spares]
         rig = self._world.rig(key, instance)
         if rig.shown is not instance:
+            rig.shown = None  # An interruption may leave it between two environments.
             set_fixed_objects(rig, instance)
             height_m = self._world.height_m
             rig.scene.robot.set_height(rig.plant, rig.plant_context, rig.scene.arm, height_m)

@@ -124,15 +124,13 @@ def fit_model(
     """Returns an estimator fitted to a library D1, or to pairs D2 where features observe a reach.
 
     Its settings come from the simulated rows; those of other sources change the estimate, by their
-    weight, but no setting. Settings are kept, see `lic_drake.estimate.kept`, and found again.
+    weight, but no setting. Fits are kept, see `lic_drake.estimate.kept`, and found again.
     """
-    from lic_drake.estimate.kept import keep_settings, kept_path, read_settings
+    from lic_drake.estimate.kept import fit_as_kept, keep_fit, kept_path
 
     rows, fitted = features.rows(columns), make_estimator(estimator, features)
     path, part = kept_path(estimator, features, rows), rows.simulated
-    known = None if path is None else read_settings(path, fitted, rows.X.shape[1], say)
-    if known is not None:
-        fitted.set_params(**known).fit(rows.X, rows.y, sample_weight=rows.weight)
+    if path is not None and fit_as_kept(path, fitted, rows, say):
         return SuccessModel(estimator=fitted, features=features)
     kind = "pairs of reaches" if features.observed else "reaches"
     say(f"fitting {estimator} on {len(rows.y)} {kind} of {category} ...")
@@ -144,5 +142,5 @@ def fit_model(
         fitted = fitted.conditioned_on(rows.X, rows.y, rows.weight)
     say(f"fitted {estimator} in {time.perf_counter() - began:.1f} s")
     if path is not None:
-        keep_settings(path, fitted, say)
+        keep_fit(path, fitted, say)
     return SuccessModel(estimator=fitted, features=features)

@@ -68,7 +68,7 @@ def showing(*arguments: str) -> Iterator[str]:
         _, err = process.communicate(timeout=60)
     finally:
         process.kill()
-    assert process.returncode == 130
+    assert process.returncode == 130, err
     assert err.endswith("lic: interrupted\n") and "Traceback" not in err
 
 

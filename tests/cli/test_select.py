@@ -1,10 +1,14 @@
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+from support.trial_rows import make_rows
 
 from lic_drake.cli.main import main
+from lic_drake.evaluate.reliability import FOLDER
+from lic_drake.evaluate.trials import write_trials
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.paths import shipped_library
 from lic_drake.select.registry import make_selector
@@ -95,3 +99,21 @@ def test_for_a_pr2_base_and_torso_of_the_failure_count(capsys: pytest.CaptureFix
     hand = np.subtract(second["start"][:3], first["start"][:3])
     stand = np.subtract([*second["base"], second["torso"]], [*first["base"], first["torso"]])
     assert max(np.linalg.norm(hand), np.linalg.norm(stand)) > 0.1
+
+
+def test_where_choices_are_known_the_answer_has_a_probability_and_may_be_not_from_here(
+    library: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    copy = shutil.copytree(library, tmp_path / "copy")
+    arguments = [*GOAL, "--library", str(copy), "--method", "knn", "--json"]
+    code, out, err = select(capsys, *arguments, "--least", "0.2")
+    assert code == 2 and out == "" and "has no 30 choices of knn for attempt 1" in err
+    assert "probability" not in json.loads(select(capsys, *arguments)[1])
+    write_trials(copy / FOLDER / "trials.parquet", make_rows("knn", ["1", "0", "0"] * 40))
+    for least, worth in (("0.2", True), ("0.6", False)):
+        answer = json.loads(select(capsys, *arguments, "--least", least)[1])
+        assert answer["worth_trying"] is worth and answer["choices"] == 120
+        low, high = answer["interval"]
+        assert 0.2 < low < answer["probability"] < high < 0.6
+    code, _, err = select(capsys, *arguments, "--least", "20")
+    assert code == 2 and "--least must be from 0 to 1, got 20" in err

@@ -10,6 +10,7 @@ import pytest
 from support.fake_reach import fill_library
 from support.starts import ARM, LINE
 
+from lic_drake.estimate import gaussian_process
 from lic_drake.estimate.estimator import from_sklearn
 from lic_drake.estimate.kept import VARIABLE, cache_folder
 from lic_drake.estimate.registry import register_estimator
@@ -71,6 +72,32 @@ def test_a_kept_fit_selects_the_same_bit_for_bit(
     without, said = make(method, mixed)
     assert len(said) == 4
     assert answers(first) == answers(second) == answers(without)
+
+
+def test_a_kept_process_solves_nothing_and_forgets_the_solution_with_other_rows(
+    columns: dict[str, Any], kept: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first, _ = make("gp1", columns)
+    (path,) = kept.iterdir()
+
+    def refuse(*args: object) -> None:
+        raise AssertionError("solved again")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(gaussian_process, "_solve", refuse)
+        second, said = make("gp1", columns)
+    assert said == [] and answers(first) == answers(second)
+    X, y = np.random.default_rng(0).uniform(0.0, 0.5, (6, 4)), np.array([0.0, 1.0] * 3)
+    other, again = (
+        selector.first.estimator.conditioned_on(X, y).values(X) for selector in (first, second)
+    )
+    np.testing.assert_array_equal(other, again)
+    assert not np.array_equal(other, first.first.estimator.values(X))
+    for solution in (np.ones(3), np.ones((2, 2)), np.full(7, np.nan)):
+        with np.load(path) as file:
+            arrays = dict(file)
+        np.savez(path, **(arrays | {"solution_": solution}))
+        assert answers(make("gp1", columns)[0]) == answers(first)
 
 
 def test_other_rows_are_fitted_anew(columns: dict[str, Any], kept: Path) -> None:

@@ -130,6 +130,27 @@ def test_environments_with_the_same_movable_objects_share_a_diagram() -> None:
     assert len(session.diagrams) == 2
 
 
+@pytest.mark.parametrize("place", ["make_reach_diagram", "set_fixed_objects"])
+def test_an_interrupted_beginning_spoils_no_later_reach(
+    place: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session, request = ReachSession(), reach_request(small_clutter(0.4))
+    requests = [replace(request, environment=environment) for environment in range(2)]
+    whole = getattr(sleeping, place)
+
+    def stop_early(*arguments: object) -> object:
+        whole(*arguments)
+        raise KeyboardInterrupt
+
+    if place == "set_fixed_objects":
+        session.run(requests[0])
+    with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
+        patched.setattr(sleeping, place, stop_early)
+        session.run(requests[1])
+    fresh = [ReachSession().run(request) for request in requests]
+    assert comparable(list(map(session.run, requests))) == comparable(fresh)
+
+
 SCENARIO = load_scenario("cylinder-clutter")
 HERE = make_clutter(cylinder(0.6, 0.3), box(0.5, -0.6, (0.3, 0.1, 0.2)), cylinder(0.3, 0.5))
 THERE = make_clutter(box(0.35, 0.2, (0.2, 0.2, 0.2)), cylinder(0.2, -0.4), cylinder(0.7, 0.0))

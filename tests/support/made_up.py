@@ -31,12 +31,15 @@ def planar_library(path: Path, scenario: Scenario) -> ExperienceLibrary:
     return library
 
 
-def part_of_shipped(path: Path, category: str, environments: int) -> ExperienceLibrary:
-    """The first environments of a shipped library."""
+def part_of_shipped(
+    path: Path, category: str, environments: int, least_y: float = -1.0
+) -> ExperienceLibrary:
+    """The first environments of a shipped library, with all goals or those far to the left."""
     path.mkdir()
     for shard in ExperienceLibrary(shipped_library(category)).shard_paths():
         table = read_shard(shard)[1]
-        part = table.filter(pc.field("environment") < environments)
+        far = pc.field("goal_y") >= least_y
+        part = table.filter((pc.field("environment") < environments) & far)
         if len(part):
             write_table(part, path / shard.name)
     return ExperienceLibrary(path)
