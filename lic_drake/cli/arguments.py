@@ -78,7 +78,7 @@ _SHARED: dict[str, dict[str, Any]] = {
         "metavar": "METRES",
         "type": float,
         "nargs": "+",
-        "help": "goal in metres, X Y in the plane, X Y Z for the PR2; x points into the clutter"
+        "help": "goal in metres, X Y in the plane, X Y Z in space; x points into the clutter"
         " (default: lic reach takes the environment's goal, else 0.6 0)",
     },
     "--method": {

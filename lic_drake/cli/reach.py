@@ -33,8 +33,8 @@ def add_parser(subparsers: Subparsers) -> None:
     for name, metavar, text in (
         ("--start-y", "Y", "planar arm: position on the start line, metres (default: 0)"),
         ("--start-phi", "DEG", "planar arm: degrees from straight ahead (default: 60)"),
-        ("--base-y", "Y", "PR2: position of the base, metres (default: 0)"),
-        ("--torso", "Z", "PR2: height of the torso, metres (default: the scenario's)"),
+        ("--base-y", "Y", "arm in space: position of the base, metres (default: 0)"),
+        ("--torso", "Z", "arm in space: height of its base, metres (default: the scenario's)"),
     ):
         reach.add_argument(name, type=float, metavar=metavar, help=text)
     reach.add_argument(
@@ -42,8 +42,8 @@ def add_parser(subparsers: Subparsers) -> None:
         type=float,
         nargs=2,
         metavar=("Y", "Z"),
-        help="PR2: position in the board of the aperture to reach through, metres (default: the"
-        " open one nearest to the goal)",
+        help="arm in space: position in the board of the aperture to reach through, metres (default:"
+        " the open one nearest to the goal)",
     )
     reach.add_argument(
         "--record",
@@ -71,7 +71,7 @@ def add_parser(subparsers: Subparsers) -> None:
         metavar="YAML|FILE",
         help="a failed attempt: a file written by `lic reach --json`, or values named like a"
         " record's columns (metres, radians, m/s): start_y, start_phi and, for LIC-2, the final"
-        " pose; for the PR2 start_y and start_z of the aperture, base_y and torso; may be repeated"
+        " pose; in space start_y and start_z of the aperture, base_y and torso; may be repeated"
         " (default: none)",
     )
     select.add_argument(

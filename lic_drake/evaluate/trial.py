@@ -114,8 +114,8 @@ def random_requests(
 class Evaluation:
     """The parameters of an evaluation; plain data that can be pickled.
 
-    Environments and goals are drawn from a seed stream; `moves` says whether a PR2 may move base
-    and torso. With cameras, a reach succeeds if it ends in the ball.
+    Environments and goals are drawn from a seed stream; `moves` says whether an arm in space may
+    move its base and torso. With cameras, a reach succeeds if it ends in the ball.
 
     Attributes:
         experience: Library that the strategies learn from; its scenario is the default.
