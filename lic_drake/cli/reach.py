@@ -42,7 +42,7 @@ def add_parser(subparsers: Subparsers) -> None:
         type=float,
         nargs=2,
         metavar=("Y", "Z"),
-        help="arm in space: position in the board of the aperture to reach through, metres (default:"
+        help="arm in space: place in the board of the aperture to reach through, metres (default:"
         " the open one nearest to the goal)",
     )
     reach.add_argument(
