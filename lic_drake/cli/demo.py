@@ -8,6 +8,7 @@ from lic_drake.cli.arguments import (
     add_command,
     add_count,
     category_of,
+    overrides_of,
     print_result,
     quick_imports,
     remark,
@@ -85,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
     foliage, meshes = category == _FOLIAGE, args.visuals == "drake_models"
     # Libraries of a robot other than the category's own have its name, too.
     robot = "" if load_scenario(category).robot == args.robot else args.robot
-    overrides = args.set or ("{clutter: {num_blocked: 8}}" if category == _SPHERES else "")
+    overrides = overrides_of(args, category)
     # In foliage, experience comes from spheres: the demonstration is about transfer (paper V-B).
     learned = _SPHERES if foliage else category
     path = args.library or shipped_library(learned, robot)

@@ -8,6 +8,7 @@ from lic_drake.cli.arguments import (
     Subparsers,
     add_command,
     category_of,
+    overrides_of,
     print_result,
     remark,
     whole_number,
@@ -52,9 +53,9 @@ def add_parser(subparsers: Subparsers) -> None:
         "collect, learn and evaluate within a budget",
         "Reaches in rounds of new environments, from starts that COST proposes in the first round"
         " and then the estimate that was learned so far; after 60 % of the budget, compares RND,"
-        " COST and the estimate on unseen environments. Leaves a library, a table and a"
-        " demonstration. Run again, it goes on where it was, with a budget of minutes for as many"
-        " more.",
+        " COST and the estimate on unseen environments. Before spheres 8 of 20 apertures are closed,"
+        " unless --set says otherwise. Leaves a library, a table and a demonstration. Run again, it"
+        " goes on where it was, with a budget of minutes for as many more.",
         "lic train out/mine --robot mine.yaml --minutes 10",
         ["--robot", "--category", "--set", "--workers", "--scheduler", "--json"],
     )
@@ -100,11 +101,12 @@ def run_train(args: argparse.Namespace) -> int:
     from lic_drake.experience.schema import write_atomically
     from lic_drake.show.demonstration import demonstrate
 
+    category = args.category or category_of(args.robot)
     with workers_of(args) as workers:
         rows = train(
             args.out,
-            args.category or category_of(args.robot),
-            with_robot(args.set, args.robot),
+            category,
+            with_robot(overrides_of(args, category), args.robot),
             minutes=args.minutes,
             reaches=args.reaches,
             workers=workers,

@@ -11,8 +11,8 @@ from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.experience.workers import Workers
 from lic_drake.reach.scenario import load_scenario
 
-LEARNING = 0.6
-"""Share of the budget that is spent before the evaluation begins."""
+LEARNING, BEGINNING = 0.6, 0.95
+"""Shares of the budget after which the evaluation begins, and after which no environment does."""
 
 GOALS = 4
 """Goals in each environment of a round, where it has so many."""
@@ -97,6 +97,7 @@ def train(
         )
     say(f"{len(library.successes())} reaches; {', '.join(METHODS)} on unseen environments")
     if reaches is None:
-        return run("evaluation", lambda: is_spent(1.0), methods=METHODS, environments=MANY, goals=1)
+        compared = {"methods": METHODS, "environments": MANY, "goals": 1}
+        return run("evaluation", lambda: is_spent(BEGINNING), **compared)
     environments = math.ceil((1.0 - LEARNING) * reaches / (2 * len(METHODS)))
     return run("evaluation", None, methods=METHODS, environments=environments, goals=1)
