@@ -53,9 +53,9 @@ def add_parser(subparsers: Subparsers) -> None:
         "collect, learn and evaluate within a budget",
         "Reaches in rounds of new environments, from starts that COST proposes in the first round"
         " and then the estimate that was learned so far; after 60 % of the budget, compares RND,"
-        " COST and the estimate on unseen environments. Before spheres 8 of 20 apertures are closed,"
-        " unless --set says otherwise. Leaves a library, a table and a demonstration. Run again, it"
-        " goes on where it was, with a budget of minutes for as many more.",
+        " COST and the estimate on unseen environments. Before spheres 8 of 20 apertures are"
+        " blocked, unless --set says otherwise. Leaves a library, a table and a demonstration. Run"
+        " again, it goes on where it was, with a budget of minutes for as many more.",
         "lic train out/mine --robot mine.yaml --minutes 10",
         ["--robot", "--category", "--set", "--workers", "--scheduler", "--json"],
     )
