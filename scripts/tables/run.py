@@ -184,7 +184,8 @@ def write(results: Path) -> list[Path]:
     spheres = load_trials(results, "sphere-aperture-clutter")
     every = ExperienceLibrary(results / "bounds" / "sphere-aperture-clutter" / "random")
     tables["table_pr2"] = [pr2_table(spheres), oracle_table(spheres, every)]
-    arms = {arm: load_trials(results, folder) for arm, folder in ARMS.items()}
+    there = {arm: folder for arm, folder in ARMS.items() if (results / folder).exists()}
+    arms = {arm: load_trials(results, folder) for arm, folder in there.items()}
     tables["table_arms"] = [arms_table(arms)]
     tables["table_foliage"] = [foliage_table(load_trials(results, "foliage-aperture-clutter"))]
     return [p for name, parts in tables.items() for p in write_tables(results, name, parts)]

@@ -15,7 +15,7 @@ import lic_drake
 from lic_drake.cli.main import main, make_parser
 from lic_drake.errors import LicError
 
-UNITS = r"metre|degree|second|\brad\b|\bN\b|newton|simulated reaches"
+UNITS = r"metre|degree|second|\brad\b|\bN\b|newton|probability|simulated reaches"
 
 
 def tree(parser: argparse.ArgumentParser, name: str) -> Iterator[tuple[str, str, object]]:
