@@ -10,8 +10,8 @@ import numpy as np
 
 from lic_drake.errors import RequestError
 
-STREAMS = ("training", "evaluation", "calibration", "holdout")
-"""Names of the environment streams."""
+STREAMS = ("training", "evaluation", "calibration", "holdout", "imagination")
+"""Names of the environment streams; the last one is what a strategy imagines."""
 
 
 def make_generator(stream: str, purpose: str, *indices: int) -> np.random.Generator:

@@ -65,7 +65,7 @@ def test_a_name_of_an_estimator_means_one_method() -> None:
     register_estimator("mine", lambda features: NearestNeighbours())
     register_estimator("mine", lambda features: NearestNeighbours())
     register_estimator("other1", lambda features: NearestNeighbours())
-    for name in ("rnd", "cost", "gp1", "mine1", "other"):
+    for name in ("rnd", "cost", "imagine", "gp1", "mine1", "other"):
         with pytest.raises(EstimateError, match=f"'{name}'.*choose another name"):
             register_estimator(name, lambda features: NearestNeighbours())
 

@@ -23,7 +23,7 @@ def register_estimator(name: str, factory: EstimatorFactory) -> None:
             " factory, not the estimator"
         )
     twins = (f"{name}1", name[:-1] if name.endswith("1") else None)
-    if name in ("rnd", "cost") or any(twin in _ESTIMATORS.entries for twin in twins):
+    if name in ("rnd", "cost", "imagine") or any(twin in _ESTIMATORS.entries for twin in twins):
         raise EstimateError(f"{name!r} would name two selection methods; choose another name")
     _ESTIMATORS.register(name, factory)
 

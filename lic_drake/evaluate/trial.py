@@ -78,7 +78,7 @@ def run_trial(
     done: list[Attempt] = []
     for number in range(attempts):
         p_seen, starts = look(number)
-        failed = tuple(FailedReach.from_record(attempt.record) for attempt in done)
+        failed = tuple(FailedReach.from_record(last.record, last.request) for last in done)
         selection = selector.select(Situation(p_WG=p_seen, starts=starts, failed=failed))
         if done and np.array_equal(p_seen, done[-1].request.goal):
             request = done[-1].request.then(selection.start)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lic_drake.types import Vector
+from lic_drake.types import IntVector, Vector
 
 VELOCITY_WINDOW_S = 1.0
 """Time over which the velocity at the end of a reach is averaged, seconds."""
@@ -38,6 +38,7 @@ class ReachTrace:
         p_WE: Tip positions, each shape (3,), metres.
         peak_force: Largest taxel force of each sample, N; total_force their sum.
         contacts: Number of loaded taxels.
+        loaded: Their indices and forces, N.
         states: The state of the scene at each sample, if it was asked for.
         b0: Position of R, shape (3,), metres.
         q_clutter: As in `SceneState`, at the end; None where there is none or it is not finite.
@@ -50,6 +51,7 @@ class ReachTrace:
     peak_force: list[float] = field(default_factory=list)
     total_force: list[float] = field(default_factory=list)
     contacts: list[int] = field(default_factory=list)
+    loaded: list[tuple[IntVector, Vector]] = field(default_factory=list)
     states: list[SceneState] = field(default_factory=list)
     b0: Vector = field(default_factory=lambda: np.zeros(3))
     q_clutter: Vector | None = None
@@ -62,7 +64,9 @@ class ReachTrace:
         self.p_WE.append(p_WE)
         self.peak_force.append(float(taxel_force.max()))
         self.total_force.append(float(taxel_force.sum()))
-        self.contacts.append(int(np.count_nonzero(taxel_force)))
+        loaded = np.flatnonzero(taxel_force)
+        self.contacts.append(len(loaded))
+        self.loaded.append((loaded, taxel_force[loaded]))
 
     def translate(self, offset: Vector, clutter_too: bool) -> None:
         """Moves all positions by an offset, shape (3,), metres; stems' angles are none."""

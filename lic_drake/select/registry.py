@@ -18,6 +18,9 @@ from lic_drake.select.lic import LicSelector
 from lic_drake.select.objective import SuccessModel
 from lic_drake.select.situation import Selection, Situation
 
+IMAGINE = "imagine"
+"""Name of the strategy that imagines the clutter, see `lic_drake.select.imagine`."""
+
 type Columns = Mapping[str, NDArray[Any]]
 """Columns of a library by name."""
 
@@ -54,9 +57,11 @@ def method_names() -> tuple[str, ...]:
     """Returns the names of all simple strategies; FIRST>LATER is one, too.
 
     The baselines and, for each estimator, LIC (LIC-1, then LIC-2) under its name and LIC-1 for all
-    attempts under its name with a 1: the same where a category has no LIC-2.
+    attempts under its name with a 1: the same where a category has no LIC-2. "imagine" is "gp" with
+    further attempts from what was felt.
     """
-    return ("rnd", "cost", *estimator_names(), *(f"{name}1" for name in estimator_names()))
+    names = estimator_names()
+    return ("rnd", "cost", *names, *(f"{name}1" for name in names), IMAGINE)
 
 
 def check_method(method: str) -> list[str]:
@@ -105,6 +110,12 @@ def make_selector(
         return RandomSelector(rng=rng) if method == "rnd" else CostSelector()
     if columns is None:
         raise RequestError(f"method {method!r} needs an experience library to learn from")
+    if method == IMAGINE:
+        from lic_drake.select.imagine import ImaginingSelector
+
+        lic = make_selector("gp", arm, columns, rng, category, say)
+        assert isinstance(lic, LicSelector)
+        return ImaginingSelector(lic)
     features, estimator, second = features_of(category), method, None
     if method not in estimator_names():
         estimator = method[:-1]

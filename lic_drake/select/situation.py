@@ -9,7 +9,7 @@ import numpy as np
 
 from lic_drake.errors import RequestError
 from lic_drake.experience.pairs import SHOWN
-from lic_drake.reach.request import ReachRecord
+from lic_drake.reach.request import ReachRecord, ReachRequest
 from lic_drake.reach.start import IN_PLANE, POSE_AXES, Start, Starts
 from lic_drake.starts import FeasibleStarts, Region
 from lic_drake.types import BoolVector, Vector
@@ -25,11 +25,13 @@ class FailedReach:
     """What a reach that failed showed (paper III-C), all in W.
 
     `shown` has what an observation o may be made of, by the names of the records' columns, see
-    `lic_drake.experience.pairs.SHOWN`; the final values are only there if it began at all.
+    `lic_drake.experience.pairs.SHOWN`; the final values are only there if it began at all. The
+    `request` of a simulated reach leads to all that the skin felt.
     """
 
     start: Start
     shown: Mapping[str, float]
+    request: ReachRequest | None = None
 
     @classmethod
     def from_start(cls, start: Start) -> Self:
@@ -39,9 +41,10 @@ class FailedReach:
         return cls(start=start, shown=shown)
 
     @classmethod
-    def from_record(cls, record: ReachRecord) -> Self:
-        """Returns what a record says of a failed reach."""
-        return cls(start=record.start, shown={name: getattr(record, name) for name in SHOWN})
+    def from_record(cls, record: ReachRecord, request: ReachRequest | None = None) -> Self:
+        """Returns what a record says of a failed reach, and its request if that is known."""
+        shown = {name: getattr(record, name) for name in SHOWN}
+        return cls(start=record.start, shown=shown, request=request)
 
 
 @dataclass(frozen=True, kw_only=True)
