@@ -79,8 +79,7 @@ def train(
         )
         return run_evaluation(evaluation, workers, say, is_over)
 
-    while not is_spent(LEARNING):
-        held = len(library.successes())
+    while not (held := len(library.successes())) or not is_spent(LEARNING):
         tried = 1 + int(library.columns()["environment"].max()) if held else 0
         method, environments = "gp" if held else "cost", max(LEAST, tried // GROWTH)
         say(f"{held} reaches; up to {environments} environments with {method}")
