@@ -19,9 +19,18 @@ def scenarios_dir() -> Path:
     return models_dir() / "scenarios"
 
 
-def shipped_library(category: str) -> Path:
-    """Returns the folder of the experience library shipped for a category."""
-    return models_dir() / "experience" / category
+def robots_dir() -> Path:
+    """Returns the folder of robot files."""
+    return models_dir() / "robots"
+
+
+def shipped_library(category: str, robot: str = "") -> Path:
+    """Returns the folder of the experience library shipped for a category.
+
+    That of a robot other than the category's own has both names: iiwa14-sphere-aperture-clutter.
+    """
+    name = f"{Path(robot).stem}-{category}" if robot else category
+    return models_dir() / "experience" / name
 
 
 def shipped_libraries() -> list[Path]:

@@ -13,6 +13,14 @@ for library in "passage-clutter 120" "cylinder-aperture-clutter 480" "sphere-ape
         lic collect "models/experience/$1" --scenario "$1" --environments "$2"
 done
 
+for arm in "iiwa14 16" "panda 13"; do
+    # shellcheck disable=SC2086
+    set -- $arm
+    library=models/experience/$1-sphere-aperture-clutter
+    [ -e "$library/training.parquet" ] ||
+        lic collect "$library" --scenario sphere-aperture-clutter --set "{robot: $1}" --environments "$2"
+done
+
 # evaluate CATEGORY ENVIRONMENTS GOALS OPTIONS...
 evaluate() {
     category=$1 environments=$2 goals=$3
@@ -51,6 +59,11 @@ evaluate_pr2
 evaluate_pr2 --still --variant still
 python scripts/bounds/run.py sphere-aperture-clutter --environments 100 --still \
     --set '{clutter: {num_blocked: 10}}'
+# Other arms, on pedestals that move.
+for arm in iiwa14 panda; do
+    evaluate $arm-sphere-aperture-clutter 150 1 --methods rnd cost gp \
+        --set '{clutter: {num_blocked: 10}}'
+done
 
 # Before foliage: apertures and goal seen by cameras or known; learned among spheres or foliage.
 evaluate_foliage() {

@@ -122,7 +122,7 @@ def described(*changes: tuple[str, str]) -> str:
         ([('<origin xyz="0 -0.334 0"/>', '<origin xyz="0.334 0 0"/>')], "closed form"),
         ([('type="revolute"', 'type="fixed"')], "0 revolute joints"),
         ([('lower="-2.61799387799" upper="2.61799387799" ', "")], "limits"),
-        ([('<drake:capsule radius="0.015" length="0.334"/>', '<sphere radius="0.1"/>')], "capsule"),
+        ([('<drake:capsule radius="0.015" length="0.334"/>', '<box size="1 1 1"/>')], "capsule"),
         ([("</robot>", "")], "planar arm"),
     ],
 )

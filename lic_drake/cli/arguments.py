@@ -10,6 +10,9 @@ from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+import yaml
+
+from lic_drake.config import read_mapping
 from lic_drake.paths import find_library
 
 if TYPE_CHECKING:
@@ -38,6 +41,12 @@ def whole_number(least: int) -> Callable[[str], int]:
     return read
 
 
+CATEGORIES = (
+    *("cylinder-clutter", "passage-clutter", "cylinder-aperture-clutter"),
+    *("sphere-aperture-clutter", "foliage-aperture-clutter"),
+)
+"""Clutter categories that are shipped: three in the plane, two in space."""
+
 _SHARED: dict[str, dict[str, Any]] = {
     "--scenario": {
         "metavar": "NAME|FILE",
@@ -51,6 +60,15 @@ _SHARED: dict[str, dict[str, Any]] = {
         "help": 'scenario values to override, in SI units, e.g. "{stop: {timeout_s: 20}}"'
         " (default: none)",
     },
+    "--robot": {
+        "metavar": "NAME|FILE",
+        "default": "",
+        "help": "robot, or path of its .yaml file (default: that of the category)",
+    },
+    "--category": {
+        "choices": CATEGORIES,
+        "help": f"clutter category (default: {CATEGORIES[0]}, for an arm in space {CATEGORIES[3]})",
+    },
     "--stream": {
         "metavar": "NAME",
         "help": "seed stream of the environments: training, evaluation, calibration or holdout"
@@ -60,7 +78,7 @@ _SHARED: dict[str, dict[str, Any]] = {
         "metavar": "METRES",
         "type": float,
         "nargs": "+",
-        "help": "goal in metres, X Y in the plane, X Y Z for the PR2; x points into the clutter"
+        "help": "goal in metres, X Y in the plane, X Y Z in space; x points into the clutter"
         " (default: lic reach takes the environment's goal, else 0.6 0)",
     },
     "--method": {
@@ -148,6 +166,29 @@ def quick_imports() -> Iterator[None]:
     finally:
         gc.freeze()  # Most of it stays.
         gc.enable()
+
+
+def category_of(robot: str) -> str:
+    """Returns the category that --category means by default, for a --robot or none."""
+    if not robot:
+        return CATEGORIES[0]
+    from lic_drake.robots.registry import get_robot
+
+    return CATEGORIES[0 if get_robot(robot).is_planar else 3]
+
+
+def overrides_of(args: argparse.Namespace, category: str) -> str:
+    """Returns the YAML text of --set; before spheres, where it is empty, some apertures are closed.
+
+    With all of them open the best start is too often the one that is straight before the goal.
+    """
+    return args.set or ("{clutter: {num_blocked: 8}}" if category == CATEGORIES[3] else "")
+
+
+def with_robot(overrides: str, robot: str) -> str:
+    """Returns the YAML text of --set with a robot added, unless that is empty."""
+    values = read_mapping(overrides, "--set")
+    return yaml.safe_dump(values | {"robot": robot}) if robot else overrides
 
 
 @contextmanager

@@ -7,20 +7,18 @@ from lic_drake.cli.arguments import (
     Subparsers,
     add_command,
     add_count,
+    category_of,
+    overrides_of,
     print_result,
     quick_imports,
     remark,
     whole_number,
+    with_robot,
 )
 from lic_drake.errors import LicError, check_writable
 from lic_drake.paths import shipped_libraries, shipped_library
 
 _FOLIAGE, _SPHERES = "foliage-aperture-clutter", "sphere-aperture-clutter"
-_CATEGORIES = {
-    "planar-arm": ("cylinder-clutter", "passage-clutter", "cylinder-aperture-clutter"),
-    "pr2": (_SPHERES, _FOLIAGE),
-}
-"""Categories of each robot, the default one first."""
 
 _SEEDS = {
     "cylinder-clutter": 13,
@@ -41,22 +39,13 @@ def add_parser(subparsers: Subparsers) -> None:
         " demo.json, pictures, for foliage also what the cameras saw, and, if rendering is"
         " available, stills and a film (film.webp). A page shows all of it (index.html).",
         "lic demo --robot pr2 --seed 3 --out out",
-        ["--method", "--library", "--set"],
+        ["--robot", "--category", "--method", "--library", "--set"],
     )
     parser.add_argument(
         "--seed",
         metavar="N",
         type=whole_number(0),
         help="environment, and seed of random choices (default: one that takes two attempts)",
-    )
-    parser.add_argument(
-        "--robot", choices=list(_CATEGORIES), help="robot (default: that of the category)"
-    )
-    parser.add_argument(
-        "--category",
-        choices=sum(_CATEGORIES.values(), ()),
-        help="clutter category; in foliage, cameras find apertures and goal (default: the first"
-        " one of the robot)",
     )
     parser.add_argument(
         "--visuals",
@@ -89,28 +78,38 @@ def run(args: argparse.Namespace) -> int:
         from lic_drake.experience.store import ExperienceLibrary
         from lic_drake.perception.config import load_cameras
         from lic_drake.reach.scenario import load_scenario, parse_scenario
+        from lic_drake.robots.registry import get_robot
         from lic_drake.show.demonstration import demonstrate
         from lic_drake.show.pr2_meshes import find_drake_models
 
-    category = args.category or _CATEGORIES[args.robot or "planar-arm"][0]
+    category = args.category or category_of(args.robot)
     foliage, meshes = category == _FOLIAGE, args.visuals == "drake_models"
-    overrides = args.set or ("{clutter: {num_blocked: 8}}" if category == _SPHERES else "")
+    # Libraries of a robot other than the category's own have its name, too.
+    robot = "" if load_scenario(category).robot == args.robot else args.robot
+    overrides = overrides_of(args, category)
     # In foliage, experience comes from spheres: the demonstration is about transfer (paper V-B).
-    library = ExperienceLibrary(args.library or shipped_library(_SPHERES if foliage else category))
+    learned = _SPHERES if foliage else category
+    path = args.library or shipped_library(learned, robot)
+    if args.library is None and not path.exists():
+        raise LicError(
+            f"no experience of {robot} in {learned} is shipped; make some with: lic train out/mine"
+            f" --robot {robot} --minutes 10, and add --library out/mine/learning/reaches"
+        )
+    library = ExperienceLibrary(path)
+    scenario = library.scenario()
+    if args.robot and get_robot(args.robot).digest != scenario.arm().digest:
+        raise LicError(f"{library.path} is for --robot {scenario.robot}, not {args.robot}")
+    scenario = parse_scenario(scenario_text(scenario), overrides, source="--set")
     if foliage:
-        scenario = load_scenario(category, overrides)
-    else:
-        scenario = parse_scenario(scenario_text(library.scenario()), overrides, source="--set")
-    if args.robot not in (None, scenario.robot):
-        raise LicError(f"{scenario.category} is for --robot {scenario.robot}, not {args.robot}")
+        scenario = load_scenario(category, with_robot(overrides, scenario.robot))
     if meshes and scenario.robot != "pr2":
         raise LicError(f"--visuals drake_models is for --robot pr2, not {scenario.robot}; omit it")
-    seed = _SEEDS.get(category, 0) if args.seed is None else args.seed
+    default = _SEEDS.get(shipped_library(category, robot).name, 0)
     result = demonstrate(
         scenario,
         library,
         args.method,
-        seed,
+        default if args.seed is None else args.seed,
         args.out,
         drake_models=find_drake_models() if meshes else None,
         cameras=load_cameras("foliage") if foliage else None,

@@ -43,7 +43,7 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--still",
         action="store_true",
-        help="keep base and torso of a PR2 fixed (default: they move along the board)",
+        help="keep base and torso or pedestal fixed (default: they move along the board)",
     )
     parser.add_argument(
         "--cameras",

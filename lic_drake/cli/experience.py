@@ -75,7 +75,7 @@ def add_parser(subparsers: Subparsers) -> None:
         "add rows of a real or another simulated robot to a library",
         "Estimators learn from them like from any other row. The CSV or Parquet file has columns"
         " named as in the library, in SI units and radians: in the plane at least success, goal_x,"
-        " goal_y, start_y, start_phi; for the PR2 also goal_z, start_x, start_z, base_y, torso, and"
+        " goal_y, start_y, start_phi; in space also goal_z, start_x, start_z, base_y, torso, and"
         " start_qw to start_qz instead of start_phi.",
         "lic experience add out/mine lab.csv --source lab-arm --weight 4",
     )

@@ -6,11 +6,11 @@ import sys
 from collections.abc import Sequence
 
 import lic_drake
-from lic_drake.cli import collect, demo, evaluate, experience, explore, reach, select
+from lic_drake.cli import collect, demo, evaluate, experience, explore, reach, robot
 from lic_drake.cli.arguments import BROKEN_PIPE, INTERRUPTED, USER_ERROR, remark
 from lic_drake.errors import LicError
 
-SUBCOMMANDS = (demo, explore, reach, select, collect, experience, evaluate)
+SUBCOMMANDS = (demo, explore, reach, collect, experience, evaluate, robot)
 """Modules with `add_parser(subparsers)`, which sets `run(args) -> int` as a parser default."""
 
 
@@ -27,7 +27,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         remark(f"lic: error: {' '.join(str(error).split())}")
         return USER_ERROR
     except KeyboardInterrupt:
-        resumable = args.run in (collect.run, evaluate.run)
+        resumable = args.run in (collect.run, evaluate.run, robot.run_train)
         hint = "; finished environments are kept, run the same command to resume"
         remark(f"lic: interrupted{hint if resumable else ''}")
         return INTERRUPTED

@@ -164,9 +164,12 @@ def _capsule(shape: SkinShape, per_metre: float) -> tuple[Vector, Vector]:
     radius, length = shape.size
     n_S = [(c, s, 0.0) for _ in _rows(length, per_metre) for c, s in _ring(radius, per_metre)]
     z = [z for z in _rows(length, per_metre) for _ in _ring(radius, per_metre)]
-    # Rings in the middle of equally wide strips of the hemispheres.
-    strips = max(1, round(0.5 * np.pi * radius * per_metre))
-    for elevation in 0.5 * np.pi * (np.arange(strips) + 0.5) / strips:
+    # Rings in the middle of equally wide strips of the hemispheres, and a taxel at the poles: where
+    # a thin arm presses with its end, the controller has to know the true direction.
+    strips = max(1, round(0.5 * np.pi * radius * per_metre - 0.5))
+    n_S += [(0.0, 0.0, sign) for sign in (1.0, -1.0)]
+    z += [sign * 0.5 * length for sign in (1.0, -1.0)]
+    for elevation in 0.5 * np.pi * (np.arange(strips) + 0.5) / (strips + 0.5):
         up, across = np.sin(elevation), np.cos(elevation)
         for sign in (1.0, -1.0):
             ring = _ring(radius * across, per_metre)

@@ -30,6 +30,7 @@ from lic_drake.select.registry import (
     Selector,
     check_method,
     make_selector,
+    needs_library,
 )
 from lic_drake.select.situation import FailedReach, Selection, Situation
 from lic_drake.starts import FeasibleStarts, make_starts
@@ -113,8 +114,8 @@ def random_requests(
 class Evaluation:
     """The parameters of an evaluation; plain data that can be pickled.
 
-    Environments and goals are drawn from a seed stream; `moves` says whether a PR2 may move base
-    and torso. With cameras, a reach succeeds if it ends in the ball.
+    Environments and goals are drawn from a seed stream; `moves` says whether an arm in space may
+    move its base and torso. With cameras, a reach succeeds if it ends in the ball.
 
     Attributes:
         experience: Library that the strategies learn from; its scenario is the default.
@@ -131,6 +132,7 @@ class Evaluation:
     methods: tuple[str, ...]
     environments: int
     goals: int
+    first: int = 0
     attempts: int = 2
     stream: str = "evaluation"
     variant: str = ""
@@ -157,12 +159,16 @@ class Evaluation:
 
 
 def run_evaluation(
-    evaluation: Evaluation, workers: Workers | None = None, say: Callable[[str], None] = print
+    evaluation: Evaluation,
+    workers: Workers | None = None,
+    say: Callable[[str], None] = print,
+    is_over: Callable[[], bool] | None = None,
 ) -> list[TrialRow]:
     """Runs every strategy on the same goals in the same environments.
 
     Stored reaches are reused; selections are always recomputed. The file of trials also keeps those
-    of other variants and strategies. `say` receives progress messages.
+    of other variants and strategies. `say` receives progress messages. When `is_over`, no further
+    environment is begun but the first: `environments` are then as many as there may be.
 
     Raises:
         LicError: A method is unknown, a library cannot be read or written, or an environment
@@ -194,10 +200,8 @@ def run_evaluation(
         now_s = time.perf_counter()
         if now_s >= said_s + SAY_S or done == count:
             said_s, left_s = now_s, (now_s - began_s) * (count - done) / done
-            say(
-                f"  {done}/{count} environments, {len(rows)} attempts, {left_s:.0f} s left; kept in"
-                f" {library.path}"
-            )
+            of, left = ("", "") if is_over else (f"/{count}", f", {left_s:.0f} s left")
+            say(f"  {done}{of} environments, {len(rows)} attempts{left}; kept in {library.path}")
 
     with library.locked():
         known: defaultdict[int, list[ReachRecord]] = defaultdict(list)
@@ -205,7 +209,8 @@ def run_evaluation(
             known[record.environment].append(record)
         tasks = (
             Task(shard_name(evaluation.stream, i), (*shared, i, known.pop(i, [])))
-            for i in range(count)
+            for i in range(evaluation.first, evaluation.first + count)
+            if i == evaluation.first or is_over is None or not is_over()
         )
         refuse_failed(run_tasks(tasks, _try_environment, workers or Workers(), finish))
         library.compact()
@@ -223,7 +228,8 @@ class _Strategies:
     def __init__(self, evaluation: Evaluation, scenario: Scenario) -> None:
         self._stream = evaluation.stream
         arm, category = scenario.arm(), scenario.category
-        columns = ExperienceLibrary(evaluation.experience).columns()
+        learns = any(needs_library(method) for method in evaluation.methods)
+        columns = ExperienceLibrary(evaluation.experience).columns() if learns else None
         aside = partial(print, file=sys.stderr, flush=True)
         make = partial(make_selector, columns=columns, category=category, say=aside)
         self._fitted: Callable[[str], Selector] = cache(partial(make, arm=arm))

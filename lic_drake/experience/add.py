@@ -78,7 +78,7 @@ def add_rows(
             **row,
             key=_digest(f"{digest} {i}"),
             category=scenario.category,
-            robot=scenario.robot,
+            robot=scenario.arm().name,
             scenario=scenario.digest,
             stream=f"{source}-{digest}",  # Shares no environments with any other rows.
             lic_drake_version=lic_drake.__version__,

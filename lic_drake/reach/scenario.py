@@ -20,6 +20,7 @@ from lic_drake.errors import RequestError, ScenarioError
 from lic_drake.paths import scenarios_dir
 from lic_drake.reach.task import StopConfig, Task
 from lic_drake.robots.arm import Arm
+from lic_drake.robots.described import robot_path
 from lic_drake.robots.registry import get_robot
 from lic_drake.scene.scene import SceneConfig
 from lic_drake.seeds import make_generator
@@ -47,7 +48,8 @@ class Scenario:
     @property
     def digest(self) -> str:
         """Identifies the scenario's values: 12 hexadecimal digits."""
-        values = json.dumps(_identity(self), sort_keys=True, default=repr)
+        identity = _identity(self) | {"robot": self.arm().digest}
+        values = json.dumps(identity, sort_keys=True, default=repr)
         return hashlib.sha256(values.encode()).hexdigest()[:12]
 
     def arm(self) -> Arm:
@@ -121,22 +123,25 @@ def parse_scenario(content: str | bytes, overrides: str = "", source: str = "sce
         if not isinstance(data.get(key), str):
             raise ScenarioError(f"{source}: {key} must be a name, got {data.get(key)!r}")
     sampler = get_category(data["category"]).sampler
-    get_robot(data["robot"])
-    mpc, preset = data.get("mpc"), "haptic_mpc_2013"
-    if isinstance(mpc, dict):
+    robot = robot_path(data["robot"], source)
+    arm, preset = get_robot(robot), "haptic_mpc_2013"
+    mpc: Any = data.get("mpc")
+    if mpc is None or isinstance(mpc, dict):
+        mpc = arm.mpc | (mpc or {})
         preset = mpc.pop("preset", preset)
     if not isinstance(preset, str) or preset not in PRESETS:
         raise ScenarioError(f"{source}: unknown mpc preset {preset!r}; choose {list(PRESETS)}")
     scenario = Scenario(
         category=data["category"],
-        robot=data["robot"],
+        robot=robot,
         clutter=read_section(sampler, data.get("clutter"), f"{source}: clutter"),
         task=read_section(Task, data.get("task"), f"{source}: task"),
         scene=read_section(SceneConfig, data.get("scene"), f"{source}: scene"),
         mpc=read_section(MpcConfig, mpc, f"{source}: mpc", defaults=PRESETS[preset]()),
         stop=read_section(StopConfig, data.get("stop"), f"{source}: stop"),
     )
-    scenario.arm().check_height(scenario.task.torso_m)
+    arm.check_height(scenario.task.torso_m)
+    _check_stiffness(arm, scenario.mpc, source)
     if scenario.task.goal_area is None and len(scenario.goals("training", 0)) == 0:
         raise ScenarioError(
             f"{source}: task: goal_area cannot be null, because an environment of"
@@ -148,3 +153,20 @@ def parse_scenario(content: str | bytes, overrides: str = "", source: str = "sce
             f" of {scenario.category} has none; leave task.base out"
         )
     return scenario
+
+
+def _check_stiffness(arm: Arm, mpc: MpcConfig, source: str) -> None:
+    """Refuses joints so stiff that one control step can press harder than contacts may be.
+
+    The controller lets forces rise by small steps that it predicts with a soft contact, whereas a
+    rigid one changes them by the joint's stiffness.
+    """
+    rise_N = np.deg2rad(mpc.max_change_deg) * arm.stiffness / arm.levers
+    worst = int(np.argmax(rise_N))
+    if np.isfinite(rise_N[worst]) and rise_N[worst] > mpc.force_threshold_N:
+        raise ScenarioError(
+            f"{source}: {arm.joint_names[worst]} of {arm.name}, {arm.stiffness[worst]:g} Nm/rad, is"
+            f" too stiff for a controller at {mpc.rate_hz:g} Hz: a step of {mpc.max_change_deg:g}"
+            f" degrees changes the force at its end by {rise_N[worst]:.1f} N, and the threshold is"
+            f" {mpc.force_threshold_N:g} N; lower its stiffness or mpc.max_change_deg"
+        )

@@ -137,7 +137,7 @@ def make_record(request: ReachRequest, result: ReachResult, wall_time_s: float) 
     return ReachRecord(
         key=request.key,
         category=scenario.category,
-        robot=scenario.robot,
+        robot=scenario.arm().name,
         scenario=scenario.digest,
         stream=request.stream,
         environment=request.environment,

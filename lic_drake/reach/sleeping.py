@@ -75,7 +75,9 @@ class SkinAxes:
         """Returns the distances from the skin at `ends` to points, shape (n, num_axes), metres."""
         along = ends[:, :, 1] - ends[:, :, 0]
         d = p_WO - ends[:, np.newaxis, :, 0]
-        share = (d @ along[:, :, np.newaxis])[..., 0] / (along * along).sum(axis=1, keepdims=True)
+        # The axis of a sphere has no length, and its ends are one.
+        square = np.maximum((along * along).sum(axis=1, keepdims=True), 1e-30)
+        share = (d @ along[:, :, np.newaxis])[..., 0] / square
         d -= np.minimum(np.maximum(share, 0.0), 1.0)[..., np.newaxis] * along[:, np.newaxis]
         return (np.sqrt((d * d).sum(axis=2)) - self._radius).min(axis=0)
 

@@ -1,14 +1,13 @@
 """`Arm`: a robot arm with an impedance controller and a tactile skin, from a model file."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import cast
 
 import numpy as np
-from pydrake.geometry import Box, Capsule, Cylinder, SceneGraph, SceneGraphInspector
+from pydrake.geometry import Box, SceneGraph
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
@@ -18,7 +17,6 @@ from pydrake.multibody.tree import (
     ModelInstanceIndex,
     PrismaticJoint,
     RevoluteJoint,
-    RigidBody,
     SpatialInertia,
     UnitInertia,
 )
@@ -26,43 +24,12 @@ from pydrake.systems.framework import Context
 
 from lic_drake.errors import ScenarioError
 from lic_drake.robots.kinematics import ArmPose, Kinematics
+from lic_drake.robots.skin import SkinShape as SkinShape
+from lic_drake.robots.skin import read_skin
 from lic_drake.types import IntVector, Vector
 
 _FLOOR = "floor_mount"
 _BASE_COLOR = np.array([0.35, 0.35, 0.38, 1.0])
-_ALONG = (
-    np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
-    np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
-    np.eye(3),
-)
-"""Rotations R_SC that lay the capsule's axis Cz along Sx, Sy and Sz."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class SkinShape:
-    """A shape of the arm's surface, which carries tactile skin; frame S lies in its centre.
-
-    Attributes:
-        link: Name of the body that carries it.
-        kind: "capsule" or "cylinder" (axis along Sz), or "box".
-        size: Radius and length of the cylindrical part, or edges along Sx, Sy and Sz, metres.
-        R_LS: Rotation of S in the link frame, shape (3, 3).
-        p_LS: Position of the centre in the link frame, shape (3,), metres.
-    """
-
-    link: str
-    kind: str
-    size: tuple[float, ...]
-    R_LS: Vector
-    p_LS: Vector
-
-    def enclosing_capsule(self) -> "SkinShape":
-        """Returns a capsule that holds the whole shape, its axis along the longest edge."""
-        if self.kind != "box":
-            return replace(self, kind="capsule")
-        axis = int(np.argmax(self.size))
-        size = (0.5 * math.hypot(*np.delete(self.size, axis)), self.size[axis])
-        return replace(self, kind="capsule", size=size, R_LS=self.R_LS @ _ALONG[axis])
 
 
 class Arm:
@@ -85,15 +52,22 @@ class Arm:
         carriage: The joints along x, y and z that carry R in the model of a mobile robot.
         height_range_m: Lowest and highest position of R along z, metres.
         is_planar: Whether the arm moves in the plane z = 0; hand poses are then (x, y, phi).
+        home: A posture by joint, radians, 0 where left out; by default in the middle of the limits.
+        digest: Tells robots of the same name apart; by default the name.
+        mpc: Values of the controller that suit the gains; a scenario may override them.
+        fit: Changes the parsed model, as a robot file wants it, and gives the arm a pedestal.
         kinematics: A class that knows some of the kinematics in closed form.
 
     Attributes:
         link_names: Names of the bodies that carry skin.
         skin: Their collision shapes.
+        joint_names: Names of the m joints.
+        q_home: The posture, within the limits, shape (m,), radians.
         stiffness: Joint stiffness of the impedance controller, shape (m,), Nm/rad.
         damping: Its joint damping, shape (m,), Nms/rad.
         p_RJ: Origins of the m joints and of the tip at q = 0, shape (m + 1, 3), metres.
-        p_RS: The first joint, about which the whole arm turns, shape (3,), metres.
+        p_RS: The point of the first axis beside the second joint, about which the whole arm turns,
+            shape (3,), metres.
         reach_m: Upper bound of the tip's distance from it, metres.
 
     Raises:
@@ -111,20 +85,25 @@ class Arm:
         q_min: Vector | None = None,
         q_max: Vector | None = None,
         held: Mapping[str, float] | None = None,
-        carriage: tuple[str, str, str] | None = None,
+        carriage: Sequence[str] | None = None,
         height_range_m: tuple[float, float] = (-np.inf, np.inf),
         is_planar: bool = False,
+        home: Mapping[str, float] | None = None,
+        digest: str = "",
+        mpc: Mapping[str, float] | None = None,
+        fit: Callable[[MultibodyPlant, ModelInstanceIndex], None] | None = None,
         kinematics: type[Kinematics] = Kinematics,
     ) -> None:
-        self.name, self.is_planar = name, is_planar
+        self.name, self.is_planar, self.digest = name, is_planar, digest or name
         self.base_frame, self.tip_frame = base_frame, tip_frame
-        self._model, self._held, self._carriage = model, dict(held or {}), carriage
+        self._model, self._held, self._carriage, self._fit = model, dict(held or {}), carriage, fit
+        self.mpc = dict(mpc or {})
         self.height_range_m = height_range_m
         plant = MultibodyPlant(time_step=1e-3)
         scene_graph = SceneGraph()
         plant.RegisterAsSourceForSceneGraph(scene_graph)
         try:
-            self._read(plant, scene_graph, skin_links, (q_min, q_max), kinematics)
+            self._read(plant, scene_graph, skin_links, (q_min, q_max), home, kinematics)
         except (OSError, RuntimeError, ValueError) as error:
             raise ScenarioError(
                 f"the model of {name} does not describe {'a planar' if is_planar else 'an'} arm:"
@@ -203,12 +182,16 @@ class Arm:
         if isinstance(self._model, Path):
             (arm,) = Parser(plant).AddModels(str(self._model))
         else:
-            (arm,) = Parser(plant).AddModelsFromString(self._model, "urdf")
+            kind = "sdf" if "<sdf" in self._model[:1000] else "urdf"
+            (arm,) = Parser(plant).AddModelsFromString(self._model, kind)
         plant.set_gravity_enabled(arm, False)
+        if self._fit is not None:
+            self._fit(plant, arm)
         held = dict(self._held)
         parent = parent or plant.world_frame()
         if mobile and self._carriage is None:
-            parent = _add_carriage(plant, arm, parent)
+            # A pedestal is seen itself.
+            parent = _add_carriage(plant, arm, parent, visible=self._fit is None)
         elif self._carriage is not None and not mobile:
             held |= dict(zip(self._carriage, (0.0, 0.0, height_m), strict=True))
             X_RF = RigidTransform(np.array([0.0, 0.0, -height_m]))
@@ -244,6 +227,7 @@ class Arm:
         scene_graph: SceneGraph,
         skin_links: Sequence[str] | None,
         limits: tuple[Vector | None, Vector | None],
+        home: Mapping[str, float] | None,
         kinematics: type[Kinematics],
     ) -> None:
         """Takes everything but names from the model; Drake's errors are RuntimeErrors."""
@@ -259,18 +243,33 @@ class Arm:
             raise ValueError(
                 f"it has {len(joints)} revolute joints and {plant.num_positions()} positions"
             )
+        self.joint_names = tuple(joint.name() for joint in joints)
         low, high = plant.GetPositionLowerLimits().copy(), plant.GetPositionUpperLimits().copy()
         self.q_min = low if limits[0] is None else np.maximum(low, limits[0])
         self.q_max = high if limits[1] is None else np.minimum(high, limits[1])
-        if not np.all(np.isfinite([self.q_min, self.q_max])):
-            raise ValueError("a joint has no limits; give q_min and q_max")
+        for joint, ends in zip(joints, zip(self.q_min, self.q_max, strict=True), strict=True):
+            if not np.all(np.isfinite(ends)):
+                raise ValueError(f"joint {joint.name()} has no limits; give both of them")
+        self.q_home = 0.5 * (self.q_min + self.q_max)
+        if home is not None:
+            self.q_home = np.array([home.get(joint.name(), 0.0) for joint in joints])
+            beyond = np.maximum(self.q_min - self.q_home, self.q_home - self.q_max)
+            if np.any(beyond > 0.0):
+                worst = self.joint_names[int(np.argmax(beyond))]
+                raise ValueError(f"joint {worst} is beyond its limits in the home posture")
         actuators = map(plant.get_joint_actuator, plant.GetJointActuatorIndices(arm))
         gains = {
             a.joint().name(): a.get_controller_gains() for a in actuators if a.has_controller()
         }
+        ordered = [name for name in gains if name in self.joint_names]
         for joint in joints:
             if joint.name() not in gains:
-                raise ValueError(f"joint {joint.name()} needs an actuator with controller gains")
+                raise ValueError(
+                    f"joint {joint.name()} needs an actuator with controller gains, or in a robot"
+                    " file stiffness and damping"
+                )
+        if ordered != list(self.joint_names):  # In which the plant takes the desired state.
+            raise ValueError(f"actuators must be in the order of the joints, got {ordered}")
         self.stiffness = np.array([gains[joint.name()].p for joint in joints])
         self.damping = np.array([gains[joint.name()].d for joint in joints])
 
@@ -284,23 +283,37 @@ class Arm:
         self.link_names = tuple(skin_links)
         links = [plant.GetBodyByName(link, arm) for link in skin_links]
         inspector = scene_graph.model_inspector()
-        self.skin = tuple(shape for link in links for shape in _read_skin(plant, inspector, link))
-        if {shape.link for shape in self.skin} != set(self.link_names) or not self.skin:
-            raise ValueError("every skin link needs a collision shape")
+        self.skin = tuple(shape for link in links for shape in read_skin(plant, inspector, link))
+        bare = sorted(set(self.link_names) - {shape.link for shape in self.skin})
+        if bare or not self.skin:
+            raise ValueError(
+                f"every skin link needs a collision shape: {', '.join(bare)} has none"
+                if bare
+                else "every skin link needs a collision shape, and no moving link has one"
+            )
         if self.is_planar and any(shape.kind != "capsule" for shape in self.skin):
             raise ValueError("the skin of a planar arm must be capsules")
         self._moves = np.array([[float(link.index() in by) for by in moved] for link in links])
 
         context = plant.CreateDefaultContext()
+        inertias = np.diag(plant.CalcMassMatrix(context))
+        for joint, bodies, inertia in zip(joints, moved, inertias, strict=True):
+            if not min(inertia, sum(plant.get_body(body).default_mass() for body in bodies)) > 0.0:
+                raise ValueError(f"joint {joint.name()} moves no mass; give its link an inertia")
         tip = plant.GetFrameByName(self.tip_frame, arm)
         frames = [joint.frame_on_parent() for joint in joints] + [tip]
         self.p_RJ = np.array([frame.CalcPoseInWorld(context).translation() for frame in frames])
-        self.p_RS = self.p_RJ[0]
-        self.reach_m = float(np.linalg.norm(np.diff(self.p_RJ, axis=0), axis=1).sum())
         self.kinematics = kinematics(self, plant, [link.body_frame() for link in links], tip)
+        # Along its axis the first joint does not move the next one.
+        axis = self.kinematics.calc_pose(np.zeros(len(joints))).Jw_E[:, 0]
+        self.p_RS = self.p_RJ[0] + axis * (axis @ (self.p_RJ[1] - self.p_RJ[0]))
+        path = np.vstack([self.p_RS, self.p_RJ[1:]])
+        self.reach_m = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
 
 
-def _add_carriage(plant: MultibodyPlant, arm: ModelInstanceIndex, frame: Frame) -> Frame:
+def _add_carriage(
+    plant: MultibodyPlant, arm: ModelInstanceIndex, frame: Frame, visible: bool
+) -> Frame:
     """Adds bodies that slide along x, y and z; returns the frame that carries the arm."""
     for axis, direction in zip("xyz", np.eye(3), strict=True):
         body = plant.AddRigidBody(
@@ -308,7 +321,7 @@ def _add_carriage(plant: MultibodyPlant, arm: ModelInstanceIndex, frame: Frame) 
         )
         plant.AddJoint(PrismaticJoint(f"base_{axis}", frame, body.body_frame(), direction))
         frame = body.body_frame()
-    if plant.geometry_source_is_registered():
+    if visible and plant.geometry_source_is_registered():
         X_BV = RigidTransform(np.array([-0.1, 0.0, 0.0]))
         plant.RegisterVisualGeometry(body, X_BV, Box(0.2, 0.2, 0.02), "base_visual", _BASE_COLOR)
     return frame
@@ -337,23 +350,3 @@ def _hold_joints(
         parent, child = joint.frame_on_parent(), joint.frame_on_child()
         plant.RemoveJoint(joint)
         plant.WeldFrames(plant.AddFrame(FixedOffsetFrame(name, parent, X_PC, arm)), child)
-
-
-def _read_skin(
-    plant: MultibodyPlant, inspector: SceneGraphInspector, link: RigidBody
-) -> Iterator[SkinShape]:
-    """Yields the collision shapes of a link."""
-    for geometry in plant.GetCollisionGeometriesForBody(link):
-        shape, X_LS = inspector.GetShape(geometry), inspector.GetPoseInFrame(geometry)
-        kind = type(shape).__name__
-        if isinstance(shape, Box):
-            size = tuple(shape.size().tolist())
-        elif isinstance(shape, Capsule | Cylinder):
-            size = (shape.radius(), shape.length())
-        else:
-            raise ValueError(
-                f"{link.name()}: skin must be capsules, boxes or cylinders, found {kind}"
-            )
-        # Copies: arrays that Drake returns may keep the plant alive.
-        R_LS, p_LS = np.array(X_LS.rotation().matrix()), np.array(X_LS.translation())
-        yield SkinShape(link=link.name(), kind=kind.lower(), size=size, R_LS=R_LS, p_LS=p_LS)

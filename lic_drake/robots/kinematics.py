@@ -4,34 +4,47 @@ Frame R is the arm's base frame, which b0 carries; frame E is the tip, which poi
 pose x0 is (x, y, phi) for an arm in the plane, else position and quaternion (w, x, y, z) of E.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
+from itertools import islice
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from pydrake.common.eigen_geometry import Quaternion
-from pydrake.math import RotationMatrix
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.inverse_kinematics import InverseKinematics, PositionCost
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, JacobianWrtVariable
-from scipy.spatial.transform import Rotation
+from pydrake.solvers import SnoptSolver, SolverOptions
 
 from lic_drake.types import BoolVector, Vector
 
 if TYPE_CHECKING:
     from lic_drake.robots.arm import Arm
 
-IK_TOLERANCE = 1e-10
-"""Largest error of a numerical inverse kinematics solution, metres and radians."""
-
 LIMIT_TOLERANCE = 1e-9
 """Joint angles this far beyond a limit, radians, are taken for rounding."""
 
-_MAX_NEWTON_STEPS = 40
-_LARGEST_STEP = 0.5
-_DAMPING = 1e-8
-_NUM_SEEDS = 32
-_DISTINCT_RAD = 1e-5
+IK_TOLERANCE = 1e-8
+"""Largest error of a numerical inverse kinematics solution, metres and radians."""
 
+# The solver begins in those of a pool of random configurations whose tip is nearest, where a turn
+# of 1 rad counts as so many metres, until it has found enough or tried enough.
+_POOL, _TURN_M, _ENOUGH, _MAX_TRIED = 1024, 0.3, 4, 16
+_SNOPT: dict[str, float] = {"Major iterations limit": 50, "Major feasibility tolerance": 1e-9}
+# From a plane this far behind the tip squares of distances are nearly linear, metres.
+_FAR_M = 10.0
+_DISTINCT_DIGITS = 5
+# The tip, a point ahead of it and one beside it, and their bounds in the frame that E is to be in.
+_INF = np.inf
+_POINTS = np.array(
+    [
+        [(0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)],
+        [(1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (_INF, 0.0, 0.0)],
+        [(0.0, 1.0, 0.0), (-_INF, 0.0, 0.0), (_INF, _INF, 0.0)],
+    ]
+)
+_X_R = np.array([1.0, 0.0, 0.0])
 
 _PERMUTATION = np.array(
     [
@@ -131,28 +144,20 @@ class Kinematics:
     def solve_ik(self, x0: Vector, near: Vector | None = None) -> Vector:
         """Returns configurations within the joint limits for a hand pose in R, shape (n, m).
 
-        A redundant arm has infinitely many, of which this is a sample: those of lowest preselection
-        cost first or, with `near`, the nearest first. A quaternion may have any positive norm.
+        A redundant arm has infinitely many, of which these are local optima: those of lowest
+        preselection cost first or, with `near`, the nearest one. A quaternion may have any positive
+        norm.
         """
         p_RE, R_RE = rigid_pose(x0)
-
-        def missing(pose: ArmPose) -> tuple[Vector, Vector]:
-            turn = Rotation.from_matrix(R_RE @ pose.R_RE.T).as_rotvec()
-            error, J = np.append(p_RE - pose.p_RE, turn), np.vstack([pose.Jv_E, pose.Jw_E])
-            rows = [0, 1, 5] if self.is_planar else slice(None)
-            return error[rows], J[rows]
-
-        if near is not None:
-            found = self._newton(missing, [near, *(0.5 * (near + self._seeds[:8]))])
-            return found[np.argsort(np.linalg.norm(found - near, axis=1), kind="stable")]
-        return self._cheapest_first(self._newton(missing, self._seeds))
+        return self._solve(RigidTransform(RotationMatrix(R_RE), p_RE), len(_POINTS), near)
 
     def solve_pointing(self, p_RE: Vector, u_R: Vector) -> list[Vector]:
         """Returns configurations with the tip at each of k places, pointing along u_R.
 
         For each place those within the limits, shape (n, m), lowest preselection cost first.
         """
-        return [self._point(p, u_R) for p in p_RE]
+        R_RE = RotationMatrix.MakeFromOneVector(u_R, 0)
+        return [self._solve(RigidTransform(R_RE, p), len(_POINTS) - 1) for p in p_RE]
 
     def calc_preselection_cost(self, q: Vector) -> Vector:
         """Returns the cost of Eq. (5) of configurations, shape (n, m), as shape (n,), 1/m.
@@ -167,47 +172,60 @@ class Kinematics:
             behind[i] = abs(pose.p_RE[0] - wrist[0]) + abs(pose.p_RE[0] - elbow[0])
         return 1.0 / np.maximum(behind, 1e-9)
 
-    def _point(self, p_RE: Vector, u_R: Vector) -> Vector:
-        if self.is_planar:
-            return self.solve_ik(np.array([p_RE[0], p_RE[1], np.arctan2(u_R[1], u_R[0])]))
+    def _solve(self, X_RE: RigidTransform, points: int, near: Vector | None = None) -> Vector:
+        """Returns the distinct optima that Drake's inverse kinematics find, shape (n, m).
 
-        def missing(pose: ArmPose) -> tuple[Vector, Vector]:
-            u = pose.R_RE[:, 0]
-            axis, cos = np.cross(u, u_R), float(u @ u_R)
-            sin = float(np.linalg.norm(axis))
-            turn = np.arctan2(sin, cos) * axis / max(sin, 1e-12) + (cos < -0.999) * pose.R_RE[:, 2]
-            across = pose.Jw_E - np.outer(u, u @ pose.Jw_E)
-            return np.append(p_RE - pose.p_RE, turn), np.vstack([pose.Jv_E, across])
+        `points` of the hand are where the pose has them: all, or without the one that fixes its
+        roll. The cost is Eq. (5), by wrist and elbow behind the tip, or the distance from `near`.
+        """
+        ik = InverseKinematics(self._plant, self._context, with_joint_limits=False)
+        program, q, world = ik.get_mutable_prog(), ik.q(), self._plant.world_frame()
+        program.AddBoundingBoxConstraint(self.q_min, self.q_max, q)
+        for p_EQ, low, high in _POINTS[:points]:
+            ik.AddPositionConstraint(
+                frameB=self._tip,
+                p_BQ=p_EQ,
+                frameAbar=world,
+                X_AbarA=X_RE,
+                p_AQ_lower=low,
+                p_AQ_upper=high,
+            )
+        if near is None:
+            p_RF, C = X_RE.translation() - _FAR_M * _X_R, np.diag([0.5 / _FAR_M, 0.0, 0.0])
+            for link in (self._links[-1], self._links[len(self._links) // 2]):
+                cost = PositionCost(self._plant, world, p_RF, link, np.zeros(3), C, self._context)
+                program.AddCost(cost, q)
+            seeds = self._seeds(X_RE, points)
+        else:
+            program.AddQuadraticErrorCost(1.0, near, q)
+            seeds = near[None]
+        solver, options = SnoptSolver(), SolverOptions()
+        for name, value in _SNOPT.items():
+            options.SetOption(solver.id(), name, value)
+        constraints = program.GetAllConstraints()
+        ends = (solver.Solve(program, seed, options).get_x_val() for seed in seeds)
+        kept = (x for x in ends if program.CheckSatisfied(constraints, x, IK_TOLERANCE))
+        found = np.array(list(islice(kept, _ENOUGH))).reshape(-1, len(q))
+        found = np.clip(found, self.q_min, self.q_max)
+        _, first = np.unique(np.round(found, _DISTINCT_DIGITS), axis=0, return_index=True)
+        found = found[first]
+        return found[np.argsort(self.calc_preselection_cost(found), kind="stable")]
 
-        return self._cheapest_first(self._newton(missing, self._seeds))
-
-    def _cheapest_first(self, q: Vector) -> Vector:
-        return q[np.argsort(self.calc_preselection_cost(q), kind="stable")]
+    def _seeds(self, X_RE: RigidTransform, points: int) -> Vector:
+        """Returns where to begin, shape (n, m)."""
+        pool, p_RE, R_RE = self._pool
+        axes = slice(points - 1)  # With a free roll only Ex counts.
+        turn = np.linalg.norm((R_RE - X_RE.rotation().matrix())[:, :, axes], axis=(1, 2))
+        apart = np.linalg.norm(p_RE - X_RE.translation(), axis=1) + _TURN_M * turn
+        return pool[np.argsort(apart, kind="stable")[:_MAX_TRIED]]
 
     @cached_property
-    def _seeds(self) -> Vector:
-        shape = (_NUM_SEEDS, len(self.q_min))
-        return np.random.default_rng(0).uniform(self.q_min, self.q_max, shape)
-
-    def _newton(
-        self, missing: Callable[[ArmPose], tuple[Vector, Vector]], seeds: Sequence[Vector] | Vector
-    ) -> Vector:
-        """Returns the distinct solutions that damped Newton steps within the limits come to.
-
-        `missing` gives the error that is left at a pose, and its Jacobian.
-        """
-        found: list[Vector] = []
-        for q in seeds:
-            for _ in range(_MAX_NEWTON_STEPS):
-                error, J = missing(self.calc_pose(q))
-                if np.abs(error).max() < IK_TOLERANCE:
-                    if all(np.abs(q - other).max() > _DISTINCT_RAD for other in found):
-                        found.append(q)
-                    break
-                step = J.T @ np.linalg.solve(J @ J.T + _DAMPING * np.eye(len(J)), error)
-                step *= min(1.0, _LARGEST_STEP / max(np.abs(step).max(), 1e-12))
-                q = np.clip(q + step, self.q_min, self.q_max)
-        return np.array(found).reshape(-1, len(self.q_min))
+    def _pool(self) -> tuple[Vector, Vector, Vector]:
+        """Random configurations, shape (n, m), with positions and rotations of their tips."""
+        shape = (_POOL, len(self.q_min))
+        pool = np.random.default_rng(0).uniform(self.q_min, self.q_max, shape)
+        poses = [self.calc_pose(q) for q in pool]
+        return pool, np.array([x.p_RE for x in poses]), np.array([x.R_RE for x in poses])
 
 
 def frozen(pose: ArmPose) -> ArmPose:

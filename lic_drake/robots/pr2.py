@@ -71,6 +71,7 @@ def make_pr2(heading: float = 0.0, head_tilt_deg: float = 0.0) -> Arm:
         held={"theta": heading} | dict(zip(left, LEFT_ARM_AT_REST, strict=True)),
         carriage=CARRIAGE,
         height_range_m=TORSO_RANGE_M,
+        home={f"r_{joint}_joint": q for joint, q in zip(JOINTS, Q_HOME.tolist(), strict=True)},
         kinematics=Kinematics if heading else Pr2Kinematics,
     )
 

@@ -8,6 +8,9 @@ A place and a direction of the tool give the wrist, and the pan angle alone is f
 from shoulder to wrist gives the elbow, two upper arm rolls bring the wrist to the right side of the
 shoulder, the lift to the right height; forearm roll and wrist flex then point the tool. Elbow and
 wrist bend one way only, so every pan angle has at most two configurations.
+
+Drake's inverse kinematics, which `Kinematics` has for any arm, find starts at as many apertures,
+up to 7 % cheaper by Eq. (5), but take 5 ms of CPU for each and this 0.3 ms.
 """
 
 from collections.abc import Sequence

@@ -1,10 +1,14 @@
-"""The known robots. A new one is a file of your own that calls `register_robot`."""
+"""The known robots. A new one is a YAML file, or code of your own that calls `register_robot`."""
 
 from collections.abc import Callable
+from functools import partial
+from pathlib import Path
 
 from lic_drake.errors import ScenarioError
+from lic_drake.paths import robots_dir
 from lic_drake.registry import Registry
 from lic_drake.robots.arm import Arm
+from lic_drake.robots.described import described_robot
 from lic_drake.robots.planar import planar_arm
 from lic_drake.robots.pr2 import pr2_arm
 
@@ -26,9 +30,13 @@ def register_robot(name: str, make: Callable[[], Arm]) -> None:
 
 
 def get_robot(name: str) -> Arm:
-    """Returns a robot; a ScenarioError if it is unknown."""
+    """Returns a robot by its name or the path of its file; a ScenarioError if it is unknown."""
+    if Path(name).suffix in (".yaml", ".yml"):
+        return described_robot(name)
     return _ROBOTS.get(name)()
 
 
 register_robot("planar-arm", planar_arm)
 register_robot("pr2", pr2_arm)
+for _path in sorted(robots_dir().glob("*.yaml")):
+    register_robot(_path.stem, partial(described_robot, _path.stem))

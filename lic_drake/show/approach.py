@@ -38,7 +38,7 @@ class Approach:
         """Builds the collision checker."""
         self.waiting = np.deg2rad(WAITING_DEG)
         self._arm = scenario.arm()
-        self._checker = CollisionChecker(self._arm, instance, scenario.scene)
+        self._checker = CollisionChecker(self._arm, instance)
 
     def path(self, b0: Vector, q_start: Vector) -> Vector:
         """Returns a path from the waiting posture to a start, shape (k, 7), radians.

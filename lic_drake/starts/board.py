@@ -16,7 +16,6 @@ from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.start import Start, Starts
 from lic_drake.robots.arm import Arm
 from lic_drake.scene.collision import CollisionChecker
-from lic_drake.scene.scene import SceneConfig
 from lic_drake.starts.feasible import TOLERANCE, Effort, FeasibleStarts, Region
 from lic_drake.types import Vector
 
@@ -90,7 +89,7 @@ class BoardStarts(FeasibleStarts):
     @cached_property
     def checker(self) -> CollisionChecker:
         """The mobile robot before the board."""
-        return CollisionChecker(self.arm, self.instance, self.scenario.scene)
+        return CollisionChecker(self.arm, self.instance)
 
     @cached_property
     def grid(self) -> Starts:
@@ -193,7 +192,7 @@ def _preferred_before_bare_board(
         board_centre=list(centre), columns=columns, rows=rows, aperture_m=aperture_m, bar_m=bar_m
     ).bare_board()
     assert bare.p_WA is not None
-    checker = CollisionChecker(arm, bare, SceneConfig())
+    checker = CollisionChecker(arm, bare)
     found = [
         start
         for place in b0

@@ -1,4 +1,4 @@
-"""Rebuilds Tables I to IV and those of the PR2 and of foliage from the recorded trials.
+"""Rebuilds Tables I to IV and those of the PR2, of other arms and of foliage from recorded trials.
 
 python scripts/tables/run.py
 """
@@ -32,6 +32,13 @@ NUMBERS = {
     "cylinder-aperture-clutter": 4,
 }
 """The paper's tables of success by category; Table II is of the first category, too."""
+
+ARMS = {
+    "PR2": "sphere-aperture-clutter",
+    "iiwa 14": "iiwa14-sphere-aperture-clutter",
+    "Panda": "panda-sphere-aperture-clutter",
+}
+"""Folders of trials before the same boards, by arm."""
 
 PARTS = (("1st attempt", 1), ("total of two", 2))
 RATE_HEADS = ("success, %", "90 % interval", "count")
@@ -79,6 +86,26 @@ def oracle_table(trials: TrialTable, every: ExperienceLibrary) -> Table:
         caption=f"The PR2 stays; the first {len(environments)} of these environments.",
         heading=("attempt", "strategy", *RATE_HEADS),
         rows=tuple(rows),
+    )
+
+
+def arms_table(trials: Mapping[str, TrialTable]) -> Table:
+    """Returns the success of several arms before spheres, where bases and heights move.
+
+    Args:
+        trials: Trials of two attempts by arm.
+    """
+    rows: list[tuple[str, ...] | None] = []
+    for arm, table in trials.items():
+        methods = [m for m in METHODS if m in table.methods("")]
+        rows += success_rows(table, arm, [(label(m), m, "") for m in methods])
+    return Table(
+        caption="Any arm in sphere-aperture-clutter with 10 of 20 apertures blocked: unseen"
+        " environments with a random goal each, the same for all strategies, and for all arms as"
+        " far as they go. Base or pedestal move. Intervals are Wilson's, 90 %; p is McNemar's exact"
+        " paired test.",
+        heading=("arm", "attempt", "strategy", *SUCCESS_HEADS),
+        rows=tuple(rows[1:]),
     )
 
 
@@ -157,6 +184,9 @@ def write(results: Path) -> list[Path]:
     spheres = load_trials(results, "sphere-aperture-clutter")
     every = ExperienceLibrary(results / "bounds" / "sphere-aperture-clutter" / "random")
     tables["table_pr2"] = [pr2_table(spheres), oracle_table(spheres, every)]
+    there = {arm: folder for arm, folder in ARMS.items() if (results / folder).exists()}
+    arms = {arm: load_trials(results, folder) for arm, folder in there.items()}
+    tables["table_arms"] = [arms_table(arms)]
     tables["table_foliage"] = [foliage_table(load_trials(results, "foliage-aperture-clutter"))]
     return [p for name, parts in tables.items() for p in write_tables(results, name, parts)]
 

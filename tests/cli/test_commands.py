@@ -15,7 +15,7 @@ import lic_drake
 from lic_drake.cli.main import main, make_parser
 from lic_drake.errors import LicError
 
-UNITS = r"metre|degree|second|\brad\b|\bN\b|newton|simulated reaches"
+UNITS = r"metre|degree|second|\brad\b|\bN\b|newton|probability|simulated reaches"
 
 
 def tree(parser: argparse.ArgumentParser, name: str) -> Iterator[tuple[str, str, object]]:
@@ -91,13 +91,16 @@ def test_what_a_machine_may_read_comes_as_json() -> None:
     with_json = {name for name, parser in LEAVES if "--json" in parser._option_string_actions}
     assert with_json == {
         *("lic reach", "lic select", "lic collect", "lic evaluate", "lic gallery", "lic bench"),
-        *("lic experience info", "lic experience check"),
+        *("lic experience info", "lic experience check", "lic robot check", "lic train"),
     }
 
 
 WRONG = [
     ("demo --method jungle", "'jungle'; choose one of rnd"),
-    ("demo --robot planar-arm --category sphere-aperture-clutter", "is for --robot pr2"),
+    ("demo --robot planar-arm --category sphere-aperture-clutter", "no experience of planar-arm"),
+    ("demo --robot iiwa14 --library cylinder-clutter", "is for --robot planar-arm, not iiwa14"),
+    ("demo --robot jungle", "choose one of planar-arm, pr2"),
+    ("train {none} --robot jungle --minutes 1", "choose one of planar-arm, pr2"),
     ("demo --visuals drake_models", "is for --robot pr2, not planar-arm; omit it"),
     ("demo --library {none}", "make one with: lic collect"),
     ("explore jungle", "choose one of cylinder-aperture-clutter"),
@@ -129,6 +132,7 @@ WRONG = [
     ("gallery {file}", "cannot write into"),
     ("gallery {none} --method jungle", "choose one of"),
     ("gallery {none} --library {file}", "damaged or not a Parquet file"),
+    ("robot check jungle", "choose one of planar-arm, pr2, iiwa14, panda"),
     ("bench reach --scenario jungle", "shipped scenarios: "),
 ]
 

@@ -122,3 +122,13 @@ def test_what_another_shape_of_the_link_covers_has_no_taxel() -> None:
     apart = [surface_taxels((shape,), ("a",), 100.0) for shape in (box, post)]
     assert layout.num_taxels < sum(part.num_taxels for part in apart)
     assert not np.any(is_inside(box, layout.p_LT) | is_inside(post, layout.p_LT))
+
+
+def test_a_thin_end_has_a_taxel_that_faces_straight_ahead() -> None:
+    for radius in (0.01, 0.02, 0.05):
+        size = (radius, 0.1)
+        end = SkinShape(link="a", kind="capsule", size=size, R_LS=np.eye(3), p_LS=np.zeros(3))
+        layout = surface_taxels((end,), ("a",), 50.0)
+        for sign in (1.0, -1.0):
+            facing = layout.n_L @ [0.0, 0.0, sign]
+            assert facing.max() == pytest.approx(1.0) and np.sum(facing > 0.999) == 1

@@ -141,7 +141,7 @@ def test_the_digest_changes_with_every_value_by_as_little_as_one_bit(name: str) 
     digests = [scenario.digest]
     for owner, name in leaves(scenario):
         value = getattr(owner, name)
-        setattr(owner, name, changed(value))
+        setattr(owner, name, "iiwa14" if name == "robot" else changed(value))
         digests.append(scenario.digest)
         setattr(owner, name, value)
     assert len(digests) > 40

@@ -173,11 +173,15 @@ def test_the_pr2s_body_moves_with_the_torso_and_its_arm_does_not() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('lower="-2.0" upper="2.0" ', "", "a joint has no limits; give q_min and q_max"),
+        ('lower="-2.0" upper="2.0" ', "", "joint turret_joint has no limits"),
         ('name="tip"', 'name="end"', "tip"),
         ('type="revolute"', 'type="prismatic"', "joint turret_joint is not revolute"),
         ("drake:controller_gains", "drake:other", "joint turret_joint needs an actuator with"),
-        ("<drake:capsule", "<drake:ellipsoid a='1' b='1' c='1'", "skin must be capsules, boxes or"),
+        (
+            "<drake:capsule",
+            "<drake:ellipsoid a='1' b='1' c='1'",
+            "skin must be capsules, boxes,",
+        ),
         ("</robot>", "", "."),
     ],
 )

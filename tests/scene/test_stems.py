@@ -149,4 +149,4 @@ def test_what_is_inside_is_unknown_to_a_robot_that_looks_for_a_free_start() -> N
     q = RIGHT_ARM_AT_REST
     elbow = robot.calc_pose(q).p_RL[3] + b0
     stem = one_stem(elbow - [0.0, 0.0, 0.3], stiffness=np.inf)
-    assert not CollisionChecker(robot, with_stems(stem), SceneConfig()).touches(b0, q)
+    assert not CollisionChecker(robot, with_stems(stem)).touches(b0, q)

@@ -12,7 +12,13 @@ from lic_drake.reach.scenario import load_scenario
 from scripts.common import load_trials, write_tables
 from scripts.second_attempts.table import second_attempts_table
 from scripts.tables.figures import goals_figure
-from scripts.tables.run import foliage_table, oracle_table, paper_tables, pr2_table
+from scripts.tables.run import (
+    arms_table,
+    foliage_table,
+    oracle_table,
+    paper_tables,
+    pr2_table,
+)
 
 
 class Columns:
@@ -59,6 +65,16 @@ def test_rates_counts_and_paired_tests_of_the_pr2_are_those_of_the_trials() -> N
     p = mcnemar(np.ones(10, dtype=bool), np.arange(10) == 0)
     assert cells[moves, "total of two", "LIC(GP)"][4] == f"{p:.2g}"
     assert cells["stay", "total of two", "LIC(GP)"][2:] == ("1/2", "", "")
+
+
+def test_arms_stand_below_each_other_each_with_its_own_baselines() -> None:
+    better = [*make_rows("cost", ["1", "00"] * 5), *make_rows("gp", ["01"] * 10)]
+    arms = {"one": TrialTable(better), "other": TrialTable(make_rows("gp", ["1", "00", "00"]))}
+    cells = {row[:3]: row[3:] for row in arms_table(arms).rows if row is not None}
+    assert cells["one", "1st attempt", "LIC(GP)"][2] == "0/10"
+    p = mcnemar(np.ones(10, dtype=bool), np.arange(10) % 2 == 0)
+    assert cells["one", "total of two", "LIC(GP)"][2:] == ("10/10", "", f"{p:.2g}")
+    assert cells["other", "total of two", "LIC(GP)"][2:] == ("1/3", "", "")
 
 
 def test_the_oracle_is_right_where_any_aperture_leads_to_the_goal() -> None:

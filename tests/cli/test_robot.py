@@ -1,0 +1,55 @@
+"""`lic robot check` on a robot file."""
+
+import json
+from pathlib import Path
+
+import pytest
+from support.six_joint_arm import write
+
+from lic_drake.cli.main import main
+from lic_drake.evaluate.trials import read_trials
+from lic_drake.experience.store import ExperienceLibrary
+
+
+@pytest.mark.usefixtures("_renderer")
+def test_a_robot_file_is_checked_and_shown(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write(tmp_path)
+    assert main(["robot", "check", str(path), "--json", "--out", str(tmp_path / "out")]) == 0
+    values = json.loads(capsys.readouterr().out)
+    assert values["reaches"] and values["settles"]
+    assert values["forearm_joint"]["stiffness_Nm_per_rad"] == 30.0
+    assert Path(values["still"]).stat().st_size > 10_000
+
+
+def test_a_bad_file_is_one_line_and_exit_code_2(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write(tmp_path, "frame: column", "frame: pillar")
+    assert main(["robot", "check", str(path)]) == 2
+    output, error = capsys.readouterr()
+    assert output == "" and len(error.splitlines()) == 1 and "base: frame 'pillar'" in error
+
+
+def test_training_learns_evaluates_and_goes_on_where_it_was(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["train", str(tmp_path), "--reaches", "60", "--workers", "1", "--json"]
+    assert main(command) == 0
+    values = json.loads(capsys.readouterr().out)
+    reaches = ExperienceLibrary(values["library"]).columns()
+    # 8 environments with 4 goals by COST, then one by the estimate, or one more that was begun.
+    count = values["reaches"]
+    assert len(reaches["key"]) == count and count in (36, 40)
+    assert set(reaches["stream"]) == {"training"} and not any(map(len, reaches["after"]))
+    rounds = read_trials(tmp_path / "learning" / "trials.parquet")
+    assert [row.method for row in rounds] == ["cost"] * 32 + ["gp"] * (count - 32)
+    assert {(rate["method"], rate["trials"]) for rate in values["rates"]} == {
+        (method, 4) for method in ("rnd", "cost", "gp")
+    }
+    assert "| gp | 2 |" in Path(values["table"]).read_text()
+    assert Path(values["demo"]).stat().st_size > 10_000
+    more = [*command[:3], "80", *command[4:]]
+    assert main(more) == 0
+    assert json.loads(capsys.readouterr().out)["reaches"] in (48, 52)

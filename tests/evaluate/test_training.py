@@ -1,0 +1,53 @@
+"""A training within a budget can be interrupted at any reach, and goes on where it was."""
+
+from pathlib import Path
+
+import pytest
+
+from lic_drake.errors import LicError
+from lic_drake.evaluate import trial
+from lic_drake.evaluate.training import METHODS, train, training_library
+from lic_drake.reach.request import ReachRecord, ReachRequest
+from lic_drake.reach.session import run_reach
+
+QUICK = "{stop: {timeout_s: 2}}"
+
+
+def test_an_interrupted_training_goes_on_where_it_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left = 13
+
+    def interrupted(request: ReachRequest) -> ReachRecord:
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise KeyboardInterrupt
+        return run_reach(request)
+
+    monkeypatch.setattr(trial, "run_reach", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        train(tmp_path, "cylinder-clutter", QUICK, reaches=40, say=lambda _: None)
+    held = training_library(tmp_path).columns()["key"].tolist()
+    assert len(held) == 12  # Three environments with four goals; the fourth was under way.
+    left = 1000
+    lines: list[str] = []
+    rows = train(tmp_path, "cylinder-clutter", QUICK, reaches=40, say=lines.append)
+    assert lines[0].startswith("12 reaches; up to 8 environments with gp")
+    reaches = training_library(tmp_path).columns()
+    assert set(held) < set(reaches["key"]) and len(reaches["key"]) >= 24
+    assert set(reaches["environment"][12:]) <= set(range(3, 11))
+    assert {row.method for row in rows} == set(METHODS)
+    assert left > 1000 - (len(reaches["key"]) - 12) - len(rows) - 1
+
+
+def test_a_folder_of_another_scenario_is_refused(tmp_path: Path) -> None:
+    train(tmp_path, "passage-clutter", QUICK, reaches=2, say=lambda _: None)
+    with pytest.raises(LicError, match="the training"):
+        train(tmp_path, "cylinder-clutter", QUICK, reaches=2)
+
+
+def test_without_time_one_environment_is_learned_from_and_one_compared(tmp_path: Path) -> None:
+    rows = train(tmp_path, "passage-clutter", QUICK, minutes=1e-6, say=lambda _: None)
+    assert {(row.method, row.environment) for row in rows} == {(name, 0) for name in METHODS}
+    assert set(training_library(tmp_path).columns()["environment"]) == {0}
