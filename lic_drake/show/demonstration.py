@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from lic_drake.errors import check_writable
+from lic_drake.evaluate.reliability import read_reliability
 from lic_drake.evaluate.trial import Attempt, run_trial
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.perception.cameras import make_renderer
@@ -130,7 +131,12 @@ def demonstrate(
     done = run_trial(scenario, selector, STREAM, seed, p_WG, attempts, reach=reach, look=look)
     for number, selection in enumerate((attempt.selection for attempt in done), start=1):
         if selection.probability is not None:
-            say(f"attempt {number}: estimated success {100 * selection.probability:.0f} %")
+            line = f"attempt {number}: estimated success {100 * selection.probability:.0f} %"
+            reliable = read_reliability(library.path, method, number)
+            if reliable is not None and library.scenario().category == scenario.category:
+                low, high = reliable.interval(selection.probability)
+                line += f"; such choices succeed in {100 * low:.0f} to {100 * high:.0f} %"
+            say(line)
     # For a baseline, the pictures show what LIC would have estimated.
     shown = selector if isinstance(selector, LicSelector) else select_with("gp")
     assert isinstance(shown, LicSelector)
