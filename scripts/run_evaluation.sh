@@ -40,9 +40,8 @@ done
 # Five attempts.
 evaluate cylinder-clutter 50 10 --methods rnd cost gp --attempts 5 --variant five-attempts
 
-# Bounds: at goals of the evaluation, and at those of the library.
+# Bounds, at goals of the evaluation.
 python scripts/bounds/run.py cylinder-clutter --environments 60 --goals 10
-python scripts/bounds/run.py cylinder-clutter --stream holdout --environments 60 --grid-goals
 python scripts/bounds/run.py passage-clutter --environments 300
 python scripts/bounds/run.py cylinder-aperture-clutter --environments 200
 # From the libraries: how much experience it takes, what features and settings bring.

@@ -36,8 +36,8 @@ def add_parser(subparsers: Subparsers) -> None:
         run,
         "select a start, reach into unseen clutter, and record it",
         "Tries once more if the reach fails. Writes a recording that plays offline (demo.html),"
-        " demo.json, pictures and, if rendering is available, stills and a film (film.webp); for"
-        " foliage also what the cameras saw (sequence.html).",
+        " demo.json, pictures, for foliage also what the cameras saw, and, if rendering is"
+        " available, stills and a film (film.webp). A page shows all of it (index.html).",
         "lic demo --robot pr2 --seed 3 --out out",
         ["--robot", "--category", "--method", "--library", "--set"],
     )

@@ -72,14 +72,14 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Explores one category after the other until it is interrupted."""
-    from lic_drake.select.registry import check_method, needs_library
+    from lic_drake.select.registry import IMAGINE, check_method, needs_library
 
     shipped = [library.name for library in shipped_libraries()]
     path = find_library(args.category)
     if not path.exists():
         known = ", ".join(shipped)
         raise LicError(f"no category or library {args.category!r}; choose one of {known}")
-    if not needs_library(args.method):
+    if not needs_library(args.method) or args.method == IMAGINE:
         raise LicError(f"--method {args.method} estimates nothing to be shown; choose gp or knn")
     if len(check_method(args.method)) > 1:
         raise LicError(f"--method {args.method} is two strategies; choose one, gp or knn")

@@ -23,7 +23,7 @@ from lic_drake.reach.trace import ReachTrace
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.registry import Selector, make_selector, needs_library
 from lic_drake.show.figures import ShownTrial, is_reachable
-from lic_drake.show.pictures import remove_pictures, save_pictures
+from lic_drake.show.pictures import index_page, remove_pictures, save_pictures
 from lic_drake.starts import FeasibleStarts, make_starts
 from lic_drake.types import Vector
 
@@ -144,9 +144,12 @@ def demonstrate(
         p_WG=p_WG,
         attempts=done,
         success=last.success if observer is None else observer.touches_ball(last),
-        files={**files, "data": out / "demo.json"},
+        files={**files, "data": out / "demo.json", "index": out / "index.html"},
     )
     _write_json(result, method, seed)
+    word = "reached" if result.success else "not reached"
+    page = index_page(f"{scenario.category}, environment {seed}: {word}", done, result.files)
+    result.files["index"].write_text(page, encoding="utf-8")
     return result
 
 

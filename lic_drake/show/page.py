@@ -46,6 +46,13 @@ def picture(data: bytes, kind: str, caption: str = "", alt: str = "") -> str:
     return f"<figure>{image}<figcaption>{html.escape(caption)}</figcaption></figure>"
 
 
+def linked(name: str, caption: str) -> str:
+    """Returns a picture in a file beside the page, which a click opens, with a plain caption."""
+    name, caption = html.escape(name), html.escape(caption)
+    image = f'<a href="{name}"><img alt="{caption}" src="{name}"></a>'
+    return f"<figure>{image}<figcaption>{caption}</figcaption></figure>"
+
+
 def pack(page: str) -> str:
     """Returns a page compressed, as letters and digits that any HTML may contain.
 

@@ -15,15 +15,26 @@ from lic_drake.show.density import densities_figure
 from lic_drake.show.detections import look_figure, maps_figure
 from lic_drake.show.figures import ShownTrial, save_figure
 from lic_drake.show.film import film_frames, save_film
-from lic_drake.show.page import embed, make_page, picture
+from lic_drake.show.page import linked, make_page
 from lic_drake.show.recording import Recording
 from lic_drake.show.stills import StillCamera, save_stills
 from lic_drake.show.views import SIDE, TOP, draw_view
 from lic_drake.starts import BoardStarts, LineStarts
 
 _OLD = (
-    *("density.png", "apertures.png", "look[1-9].png", "film.webp", "sequence.html"),
+    *("density.png", "apertures.png", "look[1-9].png", "film.webp", "index.html"),
     *(f"attempt[1-9]_{moment}.png" for moment in ("start", "middle", "end", "inside")),
+)
+
+
+_FIGURES = {
+    "density": "Estimated probability of success over the starts, before each attempt.",
+    "apertures": "Estimated probability of success through each aperture, before each attempt.",
+    "path": "The way of the arm.",
+}
+_STYLE = (
+    "img { width: auto; max-width: 100%; max-height: 38rem; }"
+    " .row { display: flex; gap: 1rem; } .row figure { flex: 1; }"
 )
 
 
@@ -44,7 +55,7 @@ def save_pictures(
     """Writes demo.html, path.png, film.webp and `lic_drake.show.stills.save_stills`'s stills.
 
     In the plane also density.png, in front of a board apertures.png, and with cameras look1.png and
-    so on, and sequence.html (all of it on one page). The estimates are the selector's; `known` is
+    so on. The estimates are the selector's; `known` is
     what the robot observed, or the feasible starts if it knows them. Returns the files by kind;
     where nothing can be rendered, `say` receives a warning, and there are neither film nor stills.
     A LicError says which file cannot be written.
@@ -65,9 +76,6 @@ def save_pictures(
         for number in range(1, len(attempts) + 1):
             figure = look_figure(selector, known, attempts, number)
             save(f"look {number}", f"look{number}.png", figure)
-        files["sequence"] = out / "sequence.html"
-        page = _sequence_page(known, attempts, files, recording)
-        files["sequence"].write_text(page, encoding="utf-8")
     elif isinstance(known, BoardStarts):
         save("apertures", "apertures.png", apertures_figure(selector, known, attempts))
     else:
@@ -117,29 +125,28 @@ def path_figure(trial: ShownTrial) -> Figure:
     return figure
 
 
-def _sequence_page(
-    observer: Observer,
-    attempts: Sequence[Attempt],
-    files: Mapping[str, Path],
-    recording: Recording,
-) -> str:
-    """Returns the whole sequence of looks and reaches as one page (paper Fig. 2)."""
-    word = "reached" if observer.touches_ball(attempts[-1].record) else "not reached"
-    parts = [
-        "<p>The robot looks, selects an aperture, a place for its base and a height for its torso,"
-        " moves base, torso and arm in that order, and reaches. After a failure it looks and"
-        " selects again. Arrows are contact forces.</p>",
-        embed(recording.html(), height_px=540),
-    ]
+def index_page(title: str, attempts: Sequence[Attempt], files: Mapping[str, Path]) -> str:
+    """Returns a page that shows and links what was written beside it, by kind (paper Fig. 2)."""
+    parts = []
     if "film" in files:
-        words = "All attempts, twice as fast, from the right and from behind the board"
-        parts.append(picture(files["film"].read_bytes(), "image/webp", words))
+        parts.append(linked(files["film"].name, "All attempts. Arrows are contact forces."))
     for number, attempt in enumerate(attempts, start=1):
-        words = f"Look {number}: open apertures, passable probabilities and goal. Attempt {number}:"
-        words += f" {attempt.record.outcome}"
+        words = f"Attempt {number}: {attempt.record.outcome}"
         if attempt.selection.probability is not None:
             words += f", estimated success {100.0 * attempt.selection.probability:.0f} %"
-        data = files[f"look {number}"].read_bytes()
-        parts.append(picture(data, "image/png", words + "."))
-    title = f"{observer.scenario.category}, environment {observer.environment}: {word}"
-    return make_page(title, "\n".join(parts))
+        parts.append(f"<h2>{words}</h2>")
+        if f"look {number}" in files:
+            words = "What the cameras saw: open apertures, passable probabilities and the goal."
+            parts.append(linked(files[f"look {number}"].name, words))
+        moments = [kind for kind in files if kind.startswith(f"attempt {number} ")]
+        stills = (linked(files[kind].name, kind.split()[-1]) for kind in moments)
+        parts.append(f'<div class="row">{"".join(stills)}</div>')
+    parts.append("<h2>What was believed, and the way</h2>")
+    for kind, words in _FIGURES.items():
+        if kind in files:
+            parts.append(linked(files[kind].name, words))
+    parts.append(
+        f'<p><a href="{files["recording"].name}">The recording</a>, to turn and to play, and'
+        f' <a href="{files["data"].name}">all numbers</a>.</p>'
+    )
+    return make_page(title, "\n".join(parts), _STYLE)

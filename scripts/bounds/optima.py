@@ -34,23 +34,6 @@ def chosen_rate(success: BoolVector, score: Vector) -> Vector:
     return np.asarray((success & best).sum(axis=2) / best.sum(axis=2))
 
 
-def area_weights(goals: Vector) -> Vector:
-    """Returns weights of goals, shape (G,), whose sum is 1, for a mean over the goal area.
-
-    On a grid, which all environments share, they are those of the trapezoidal rule: a goal on an
-    edge stands for half a cell, in a corner for a quarter. Random goals count alike.
-
-    Args:
-        goals: Goals, shape (E, G, 2), metres.
-    """
-    weight = np.ones(goals.shape[1])
-    if np.all(goals == goals[0]):
-        for values in goals[0].T:
-            if np.ptp(values) > 0.0:
-                weight[(values == values.min()) | (values == values.max())] *= 0.5
-    return weight / weight.sum()
-
-
 def pairs_of_starts(success: BoolVector) -> BoolVector:
     """Returns the outcomes of an attempt from each of two starts, shape (E, G, S (S - 1) / 2)."""
     first, second = np.array(list(combinations(range(success.shape[2]), 2))).T

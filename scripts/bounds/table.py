@@ -33,7 +33,6 @@ from lic_drake.select.baselines import Hand, corridor_cost
 from lic_drake.select.registry import fit_model
 from lic_drake.types import BoolVector, IntVector, Vector
 from scripts.bounds.optima import (
-    area_weights,
     choose_bandwidth,
     chosen_rate,
     held_out_score,
@@ -131,7 +130,7 @@ class Factorial:
 
     def bound(self, name: str, attempts: int, by_goal: Vector) -> Bound:
         """Returns a rate given by environment and goal, shape (E, G), as a mean over the goals."""
-        by_environment = by_goal @ area_weights(self.goals)
+        by_environment = by_goal.mean(axis=1)
         return Bound(name=name, attempts=attempts, by_environment=by_environment)
 
 
@@ -248,21 +247,22 @@ def cost_score(columns: Columns) -> Vector:
     return np.asarray(-np.round(cost, 9) - 1e-10 * aside)
 
 
-def category_table(results: Path, category: str, goals: str) -> Table:
+def category_table(results: Path, category: str) -> Table:
     """Returns the bounds of a category and what the strategies attain, in rising order.
 
     Args:
-        results: Folder of all records; `bounds/<category>/<goals>` holds reaches from all discrete
-            starts, see run.py.
+        results: Folder of all records; `bounds/<category>/random` holds reaches from all discrete
+            starts to goals of the evaluation, see run.py. Both attempts of strategies are read from
+            its trials.
         category: Clutter category.
-        goals: "random" for the evaluation's goals, where both attempts of strategies are read from
-            its trials, or "grid".
 
     Raises:
         LibraryError: RND's first attempt differs from the evaluation's by more than chance, so that
             the bounds would not be those of the evaluation.
     """
-    factorial = load_factorial(ExperienceLibrary(results / "bounds" / category / goals).columns())
+    factorial = load_factorial(
+        ExperienceLibrary(results / "bounds" / category / "random").columns()
+    )
     columns = factorial.columns
     library = ExperienceLibrary(shipped_library(category)).columns()
     scores = {"cost": cost_score(columns)}
@@ -285,18 +285,17 @@ def category_table(results: Path, category: str, goals: str) -> Table:
     if not low <= evaluated <= high:
         raise LibraryError(
             f"RND succeeds in {100 * low:.1f}..{100 * high:.1f} % of the reaches in"
-            f" bounds/{category}/{goals}, in {100 * evaluated:.1f} % of the evaluation: try more"
-            " environments, or its goals"
+            f" bounds/{category}, in {100 * evaluated:.1f} % of the evaluation; try more"
+            " environments"
         )
-    if goals == "random":
-        shape = factorial.success.shape[:2]
-        strategies |= {
-            (label(name), 2): factorial.bound(
-                f"{label(name)}, both attempts", 2, _both_attempts(trials, name, shape)
-            )
-            for name in scores
-        }
-    return bounds_table(bounds, strategies, f"{category}, {goals} goals")
+    shape = factorial.success.shape[:2]
+    strategies |= {
+        (label(name), 2): factorial.bound(
+            f"{label(name)}, both attempts", 2, _both_attempts(trials, name, shape)
+        )
+        for name in scores
+    }
+    return bounds_table(bounds, strategies, category)
 
 
 def _both_attempts(trials: TrialTable, method: str, shape: tuple[int, ...]) -> Vector:
@@ -314,7 +313,7 @@ def bounds_table(
     Args:
         bounds: What could be attained.
         strategies: What strategies attain, by their names and numbers of attempts.
-        what: Category and goals.
+        what: Category.
     """
     names = list(dict.fromkeys(name for name, _ in strategies))
     everything = sorted([*bounds, *strategies.values()], key=lambda b: (b.attempts, b.rate))
@@ -351,10 +350,9 @@ def bounds_table(
 def write(results: Path) -> list[Path]:
     """Writes the bounds that were measured."""
     tables = [
-        category_table(results, category, goals)
+        category_table(results, category)
         for category in TABLES
-        for goals in ("random", "grid")
-        if (results / "bounds" / category / goals).exists()
+        if (results / "bounds" / category).exists()
     ]
     return write_tables(results, "bounds", tables)
 

@@ -9,18 +9,25 @@ from lic_drake.evaluate.paper import TABLES
 from lic_drake.evaluate.statistics import count, mcnemar
 from lic_drake.evaluate.table import Table, rate_cells
 from lic_drake.evaluate.trials import TrialTable
+from lic_drake.select.registry import IMAGINE
 from scripts.common import load_trials, run_tables, write_tables
 
 NAMES = {
-    "": "LIC-2",
-    "1": "LIC-1's best away from the first",
-    ">cost": "COST away from the first",
-    ">rnd": "RND",
+    "{}": "LIC-2",
+    "{}1": "LIC-1's best away from the first",
+    "{}>cost": "COST away from the first",
+    "{}>rnd": "RND",
+    IMAGINE: "best in imagined environments",
 }
-"""Second choices by what a method's name has after the estimator's."""
+"""Second choices by the method's name, given that of the estimator."""
+
+VARIANT = IMAGINE
+"""Trials of fewer goals, of what takes long."""
 
 
-def second_attempts_table(trials: TrialTable, category: str, estimator: str) -> Table:
+def second_attempts_table(
+    trials: TrialTable, category: str, estimator: str, variant: str = ""
+) -> Table:
     """Returns success of second attempts after LIC-1 with an estimator failed.
 
     All choices follow the same failures and find the environment as these left it; McNemar's
@@ -30,19 +37,21 @@ def second_attempts_table(trials: TrialTable, category: str, estimator: str) -> 
         trials: Trials of two attempts.
         category: Clutter category.
         estimator: "gp" or "knn".
+        variant: Of the trials.
     """
-    failed = ~trials.success(estimator, 1)
-    lic_2 = trials.success(estimator, 2)[failed]
+    failed = ~trials.success(estimator, 1, variant)
+    lic_2 = trials.success(estimator, 2, variant)[failed]
     rows = []
-    for suffix, name in NAMES.items():
-        # All of these methods have LIC-1's first attempt.
-        method = f"{estimator}{suffix}"
-        if method in trials.methods():
-            won = trials.success(method, 2)[failed]
-            p = f"{mcnemar(won, lic_2):.2g}" if suffix else ""
+    for pattern, name in NAMES.items():
+        method = pattern.format(estimator)
+        # All of these methods have this LIC-1's first attempt, but imagine, which has the GP's.
+        if method in trials.methods(variant) and (method != IMAGINE or estimator == "gp"):
+            won = trials.success(method, 2, variant)[failed]
+            p = "" if method == estimator else f"{mcnemar(won, lic_2):.2g}"
             rows.append((name, *rate_cells(count(won)), p))
     return Table(
-        caption=f"Second attempts in {category} after failures of LIC-1 ({estimator}).",
+        caption=f"Second attempts in {category} after failures of LIC-1 ({estimator}) at"
+        f" {len(failed):,} goals.",
         heading=(
             *("second choice", "success, %", "Wilson 90 % interval", "count"),
             "McNemar's p against LIC-2",
@@ -52,12 +61,13 @@ def second_attempts_table(trials: TrialTable, category: str, estimator: str) -> 
 
 
 def write(results: Path) -> list[Path]:
-    """Writes a table for each category and estimator."""
-    tables = [
-        second_attempts_table(load_trials(results, category), category, estimator)
-        for category in TABLES
-        for estimator in ("gp", "knn")
-    ]
+    """Writes a table for each category and estimator, and of what was tried at fewer goals."""
+    tables = []
+    for category in TABLES:
+        trials = load_trials(results, category)
+        tables += [second_attempts_table(trials, category, name) for name in ("gp", "knn")]
+        if VARIANT in trials.variants:
+            tables.append(second_attempts_table(trials, category, "gp", VARIANT))
     return write_tables(results, "second_attempts", tables)
 
 

@@ -30,6 +30,7 @@ def taken() -> Iterator[str]:
     [
         (["explore", "no-clutter"], "no category or library 'no-clutter'; choose one of cylinder-"),
         (["explore", "--method", "cost"], "--method cost estimates nothing to be shown"),
+        (["explore", "--method", "imagine"], "--method imagine estimates nothing to be shown"),
         (["explore", "--method", "svm"], "unknown method 'svm'"),
         (["explore", "--port", "{taken}"], "is in use or does not exist; choose another --port"),
         (["explore", "--port", "70000"], "cannot listen on port 70000"),

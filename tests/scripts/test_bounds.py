@@ -9,7 +9,6 @@ from hypothesis.extra.numpy import arrays
 
 from lic_drake.errors import LibraryError
 from scripts.bounds.optima import (
-    area_weights,
     choose_bandwidth,
     held_out_score,
     one_start_score,
@@ -74,16 +73,6 @@ def test_the_bandwidth_goes_from_the_goal_itself_to_all_goals_alike(success: np.
         np.testing.assert_allclose(narrow[e], others.mean(axis=0), atol=1e-9)
         np.testing.assert_allclose(wide[e] - others.mean(axis=(0, 1)), 0.0, atol=1e-6)
     np.testing.assert_allclose(wide, one_start_score(success), atol=1e-6)
-
-
-def test_goals_of_a_grid_integrate_a_bilinear_function_over_the_goal_area() -> None:
-    x, y = (axis.ravel() for axis in np.meshgrid([0.4, 0.5, 0.6], [-0.2, 0.0, 0.2, 0.4]))
-    weight = area_weights(np.stack([np.column_stack([x, y])] * 2))
-    rates = 2.0 + 3.0 * x - y + 4.0 * x * y
-    # Its mean is its value in the middle of the area.
-    assert weight @ rates == pytest.approx(2.0 + 3.0 * 0.5 - 0.1 + 4.0 * 0.5 * 0.1)
-    scattered = np.random.default_rng(0).random((3, 5, 2))
-    np.testing.assert_allclose(area_weights(scattered), 0.2)
 
 
 @pytest.mark.parametrize(("width", "smallest", "largest"), [(0.02, 0.0, 0.03), (10.0, 0.1, 1.0)])

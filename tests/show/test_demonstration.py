@@ -77,7 +77,7 @@ def test_a_second_attempt_starts_elsewhere_and_the_pictures_are_the_new_ones_onl
 ) -> None:
     out = tmp_path / "out"
     out.mkdir()
-    old = ("apertures.png", "look2.png", "attempt3_end.png", "sequence.html", "mine.png")
+    old = ("apertures.png", "look2.png", "attempt3_end.png", "film.webp", "mine.png")
     for name in old:  # Of a demonstration of another kind.
         (out / name).touch()
     scenario = load_scenario("cylinder-aperture-clutter", "{stop: {timeout_s: 0.2}}")
@@ -86,7 +86,7 @@ def test_a_second_attempt_starts_elsewhere_and_the_pictures_are_the_new_ones_onl
     # A baseline: the densities are those that LIC would have estimated.
     result = demonstrate(scenario, library, "rnd>cost", 1, out, say=lines.append)
     assert {path.name for path in out.iterdir()} == {
-        *("demo.html", "demo.json", "density.png", "path.png", "mine.png")
+        *("demo.html", "demo.json", "density.png", "index.html", "path.png", "mine.png")
     }
     first, second = result.attempts
     assert first.record.outcome == second.record.outcome == "timeout"
@@ -114,7 +114,7 @@ def test_a_pr2_shows_what_it_did_in_drakes_meshes(
     if not any("no stills and no film: cameras cannot be simulated" in line for line in lines):
         assert [kind for kind in result.files if kind.startswith("attempt")] == stills
     for kind, path in result.files.items():
-        assert kind in ("recording", "data", "film") or path.read_bytes().startswith(PNG)
+        assert kind in ("recording", "data", "film", "index") or path.read_bytes().startswith(PNG)
     assert {"apertures", "path"} < set(result.files)
     first, second = result.attempts
     assert first.record.scenario == scenario.digest
@@ -140,9 +140,11 @@ def test_before_foliage_the_robot_looks_before_every_attempt_and_shows_it(
     off = np.linalg.norm(goals - result.p_WG, axis=1)
     assert np.all(off > 1e-4) and np.all(off < 0.05)
     assert not np.array_equal(goals[0], goals[1])
-    page = result.files["sequence"].read_text(encoding="utf-8")
-    for word in ("image/webp", "Look 1", "Look 2", "DecompressionStream"):
-        assert word in page
+    page = result.files["index"].read_text(encoding="utf-8")
+    # It links everything that was written, and nothing else.
+    names = {path.name for path in result.files.values()} - {"index.html"}
+    assert set(re.findall(r'(?:href|src)="([^"]+)"', page)) == names
+    assert "not reached</h1>" in page and "Attempt 2: timeout" in page
     assert {"look 1", "look 2", "film", "apertures", "recording"} <= set(result.files)
     assert all(path.stat().st_size > 1000 for path in result.files.values())
 
