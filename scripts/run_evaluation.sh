@@ -37,6 +37,8 @@ for category in "cylinder-clutter 200 10" "passage-clutter 2000 1" "cylinder-ape
     # Other second choices after LIC-1's failures.
     evaluate $category --methods gp1 'gp>cost' 'gp>rnd'
 done
+# Further attempts in imagined environments, which takes half a minute each.
+evaluate cylinder-clutter 50 10 --methods gp gp1 imagine --variant imagine
 # Five attempts.
 evaluate cylinder-clutter 50 10 --methods rnd cost gp --attempts 5 --variant five-attempts
 
@@ -50,6 +52,19 @@ python scripts/cross_validation/run.py models/experience/cylinder-clutter \
     --out $results/cross_validation
 python scripts/ablation/run.py models/experience/passage-clutter models/experience/cylinder-clutter
 python scripts/real_experience/run.py
+
+# Choices in other environments, by which `lic select` knows how probable success is.
+choose() {
+    category=$1 environments=$2 goals=$3
+    shift 3
+    library=models/experience/$category
+    lic evaluate "$library/choices" --library "$library" --stream calibration \
+        --environments "$environments" --goals "$goals" --methods gp knn "$@"
+}
+choose cylinder-clutter 120 2
+choose passage-clutter 220 1
+choose cylinder-aperture-clutter 100 1
+choose sphere-aperture-clutter 80 1 --set '{clutter: {num_blocked: 10}}'
 
 # The PR2, with half of the apertures blocked; base and torso move, or stay.
 evaluate_pr2() {
