@@ -37,6 +37,7 @@ tables: $(STAMP)
 	$(PYTHON_IN_VENV) scripts/tables/run.py
 	$(PYTHON_IN_VENV) scripts/bounds/table.py
 	$(PYTHON_IN_VENV) scripts/second_attempts/table.py
+	$(PYTHON_IN_VENV) scripts/tables/reliability.py
 	$(PYTHON_IN_VENV) scripts/tables/figures.py
 
 # The records themselves, from nothing in some hours; interrupted, it goes on where it was. What is
