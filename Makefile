@@ -14,7 +14,7 @@ demo: $(STAMP)
 	$(VENV)/bin/lic demo
 
 test: $(STAMP)
-	$(PYTHON_IN_VENV) -m pytest -n 2 --dist loadfile -m "not slow"
+	$(PYTHON_IN_VENV) -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow"
 
 lint: $(STAMP)
 	$(PYTHON_IN_VENV) -m ruff check .

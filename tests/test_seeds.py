@@ -43,7 +43,7 @@ def test_the_mapping_from_address_to_numpy_seed_does_not_change() -> None:
     np.testing.assert_array_equal(
         make_generator("evaluation", "cylinder-clutter", 12).random(5), expected
     )
-    assert STREAMS == ("training", "evaluation", "calibration", "holdout")
+    assert STREAMS == ("training", "evaluation", "calibration", "holdout", "imagination")
 
 
 def test_an_unknown_stream_is_named_with_the_known_ones() -> None:

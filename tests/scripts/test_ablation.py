@@ -124,7 +124,7 @@ def test_cross_validation_writes_scores_and_calibration(library: Path, tmp_path:
     assert f"| knn | {float(scores['knn']['log_loss']):.4f} |" in text
     with (tmp_path / "calibration_curves.csv").open() as file:
         counts = [int(row["count"]) for row in csv.DictReader(file) if row["estimator"] == "knn"]
-    assert np.sum(counts) == 1890
+    assert np.sum(counts) == 630
 
 
 @pytest.mark.parametrize("make", [DirichletProcess, BinomialProcess])
