@@ -6,6 +6,7 @@ are kept beside its library, with what became of them, and the estimate is calib
 a logistic function of its logit (Platt 1999), which changes no choice.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -45,7 +46,7 @@ class Reliability:
 
     @classmethod
     def fit(cls, estimates: Vector, successes: BoolVector) -> "Reliability":
-        """Learns from n choices, each of shape (n,): the maximum a posteriori."""
+        """Learns from estimates and successes of n choices, shape (n,): maximum a posteriori."""
         A = _design(estimates)
 
         def misfit(w: Vector) -> tuple[float, Vector]:
@@ -94,9 +95,13 @@ def reliability_of(
 def choices(
     rows: Sequence[TrialRow], method: str, attempt: int, variant: str = ""
 ) -> tuple[Vector, BoolVector]:
-    """Returns the estimates and successes of a strategy's attempts, each of shape (n,)."""
+    """Returns estimates and successes of a strategy's attempts, each of shape (n,).
+
+    There are none of a baseline, which estimates nothing.
+    """
     which = (variant, method, attempt)
     found = [row for row in rows if (row.variant, row.method, row.attempt) == which]
+    found = [row for row in found if not math.isnan(row.probability)]
     return np.array([row.probability for row in found]), np.array([row.success for row in found])
 
 

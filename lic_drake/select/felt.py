@@ -15,13 +15,13 @@ TOUCH_N = 1.0
 """Force from which a taxel says where an object is, N."""
 
 STILL_N = 2.5
-"""An object that did not yield was pressed harder than this, N, twice what keeps one at rest."""
+"""An object that did not yield was pressed harder than this, N; the ground's friction is 2 N."""
 
 HARD_N = 8.0
 """One that was pressed harder than this at the very end counts however briefly it was touched."""
 
 STILL_SAMPLES = 5
-"""Number of loads of at least `TOUCH_N` on it."""
+"""Otherwise there must be so many loads of at least `TOUCH_N` on it."""
 
 SAME_M = 0.02
 """An object has moved if it is found further away than this; less is the taxels' pitch, metres."""

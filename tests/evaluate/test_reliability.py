@@ -65,3 +65,4 @@ def test_it_learns_from_one_attempt_of_one_method_beside_the_library(tmp_path: P
     assert second.probabilities(np.array([0.9])) == pytest.approx(1 / 2, abs=0.05)
     assert reliability_of(rows, "knn", 1) is None and reliability_of(rows, "gp", 3) is None
     assert len(choices(rows, "gp", 1, "other")[0]) == 0
+    assert reliability_of(make_rows("cost", outcomes), "cost", 1) is None
