@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.control.taxels import TaxelLayout
 from lic_drake.reach.sleeping import SkinAxes
 from lic_drake.reach.trace import ReachTrace
@@ -26,8 +27,14 @@ STILL_SAMPLES = 5
 SAME_M = 0.02
 """An object has moved if it is found further away than this; less is the taxels' pitch, metres."""
 
-APART_M = 0.015
-"""Two objects of one kind are at least so far apart, metres."""
+APART = 1.5
+"""Fixed objects that are found are at least so many radii apart; they may be where two touch."""
+
+OVERLAP_M = 0.002
+"""Soft skin: an object may have been that deep in it, and in another object, metres."""
+
+KNOWN_M = 0.01
+"""A taxel as near as that to what is known is loaded by it, metres."""
 
 _EVERY = 5
 """One sample in so many of a reach says where the arm was."""
@@ -70,21 +77,28 @@ class _Track:
 
 
 def feel(
-    traces: Sequence[ReachTrace], arm: Arm, layout: TaxelLayout, radius: float, num_axes: int
+    traces: Sequence[ReachTrace],
+    arm: Arm,
+    layout: TaxelLayout,
+    radius: float,
+    known: ClutterInstance,
 ) -> Felt:
     """Returns what reaches felt among objects of one radius, metres, in the order of the reaches.
 
     An object is beyond a loaded taxel, by its radius along the normal. Which loads are of the same
-    object is known from sample to sample; an object that stays where it is has not yielded.
+    object is known from sample to sample; an object that stays where it is has not yielded. The
+    boxes of an instance are known, and what they load says nothing.
     """
+    num_axes = known.num_axes
     axes = SkinAxes(arm, num_axes)
     still: list[Vector] = []
     pushed: list[Vector] = []
     ends: list[Vector] = []
     for trace in traces:
-        tracks = _tracks(trace, arm, layout, radius, num_axes)
+        tracks = _tracks(trace, arm, layout, radius, known)
         moved = [track for track in tracks if np.linalg.norm(track.last - track.first) > SAME_M]
-        pushed = [track.last for track in moved]  # Those of earlier reaches were pushed on.
+        # Those of earlier reaches were pushed on; of two that overlap the later one is there now.
+        pushed = [track.last for track in sorted(moved, key=lambda track: -track.sample)]
         final = len(trace.q) - 2
         for track in tracks:
             long = track.count >= STILL_SAMPLES
@@ -94,12 +108,14 @@ def feel(
         offset = trace.b0[:num_axes, np.newaxis]
         samples = [*trace.q[::_EVERY], *trace.q[-1:]]
         ends += [axes.ends(q) + offset for q in samples]
-    fixed = _apart(still, [], num_axes)
-    return Felt(fixed, _apart(pushed, list(fixed), num_axes), axes, tuple(ends))
+    fixed = _apart(still, [], APART * radius)
+    loose = _apart(pushed, fixed, 2.0 * radius - OVERLAP_M)
+    shape = (-1, num_axes)
+    return Felt(np.reshape(fixed, shape), np.reshape(loose, shape), axes, tuple(ends))
 
 
 def _tracks(
-    trace: ReachTrace, arm: Arm, layout: TaxelLayout, radius: float, num_axes: int
+    trace: ReachTrace, arm: Arm, layout: TaxelLayout, radius: float, known: ClutterInstance
 ) -> list[_Track]:
     """Returns the objects that a reach touched, centres in W."""
     tracks: list[_Track] = []
@@ -108,9 +124,11 @@ def _tracks(
         if not len(taxels):
             continue
         pose, link = arm.calc_pose(q), layout.link[taxels]
-        p_LO = layout.p_LT[taxels] + radius * layout.n_L[taxels]
-        p_RO = pose.p_RL[link] + (pose.R_RL[link] @ p_LO[..., np.newaxis])[..., 0]
-        for centre, force in zip((p_RO + trace.b0)[:, :num_axes], forces, strict=True):
+        R_WL = pose.R_RL[link]
+        p_WT = trace.b0 + pose.p_RL[link] + _turned(R_WL, layout.p_LT[taxels])
+        p_WO = p_WT + radius * _turned(R_WL, layout.n_L[taxels])
+        unknown = _distances(p_WT, known) > KNOWN_M
+        for centre, force in zip(p_WO[unknown, : known.num_axes], forces[unknown], strict=True):
             apart = [float(np.linalg.norm(track.last - centre)) for track in tracks]
             if not apart or min(apart) >= SAME_M:
                 tracks.append(_Track(centre, centre, centre, 1, sample, force))
@@ -123,10 +141,26 @@ def _tracks(
     return tracks
 
 
-def _apart(points: Sequence[Vector], others: Sequence[Vector], num_axes: int) -> Vector:
-    """Returns the points that are apart from those before them and from others, shape (n, d)."""
+def _turned(R: Vector, v: Vector) -> Vector:
+    """Returns vectors v, shape (n, 3), turned by R, shape (n, 3, 3)."""
+    return np.asarray((R @ v[..., np.newaxis])[..., 0])
+
+
+def _distances(p_W: Vector, known: ClutterInstance) -> Vector:
+    """Returns the distances of points, shape (n, 3), from the nearest known box, shape (n,)."""
+    box = [i for i, shape in enumerate(known.shape) if shape == "box"]
+    offset = p_W[:, np.newaxis] - known.p_WO[box]
+    c, s = np.cos(known.yaw[box]), np.sin(known.yaw[box])
+    x, y = c * offset[..., 0] + s * offset[..., 1], c * offset[..., 1] - s * offset[..., 0]
+    beyond = np.abs(np.stack([x, y, offset[..., 2]], axis=-1)) - 0.5 * known.size[box]
+    beyond = np.maximum(beyond[..., : known.num_axes], 0.0)
+    return np.asarray(np.linalg.norm(beyond, axis=2).min(axis=1, initial=np.inf))
+
+
+def _apart(points: Sequence[Vector], others: Sequence[Vector], distance: float) -> list[Vector]:
+    """Returns the points that are so far from those before them and from others, metres."""
     kept: list[Vector] = []
     for point in points:
-        if all(np.linalg.norm(point - other) > APART_M for other in (*others, *kept)):
+        if all(np.linalg.norm(point - other) > distance for other in (*others, *kept)):
             kept.append(point)
-    return np.array(kept).reshape(-1, num_axes)
+    return kept

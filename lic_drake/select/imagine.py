@@ -20,7 +20,7 @@ from lic_drake.reach.environment import Environment
 from lic_drake.reach.request import ReachRequest
 from lic_drake.reach.session import default_session
 from lic_drake.reach.start import Start, Starts
-from lic_drake.select.felt import Felt, feel
+from lic_drake.select.felt import OVERLAP_M, Felt, feel
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.situation import Selection, Situation
 from lic_drake.types import BoolVector, Vector
@@ -28,16 +28,16 @@ from lic_drake.types import BoolVector, Vector
 STREAM = "imagination"
 """Seed stream of the environments."""
 
-ROUNDS = ((12, 3), (6, 4), (3, 6))
+ROUNDS = ((12, 1), (6, 2), (3, 4))
 """How many starts are tried in how many further environments, round by round."""
 
 WORTH = 2.0
 """The estimate counts as so many imagined reaches."""
 
-OVERLAP_M = 0.002
-"""Soft skin: an object may have been that deep in it, metres."""
+FAR_M = 50.0
+"""Distance from W at which objects without room are, metres."""
 
-_MOST_DRAWS = 100
+_FURTHER_DRAWS = 10
 
 
 class ImaginingSelector:
@@ -115,9 +115,9 @@ def imagined_environments(requests: Sequence[ReachRequest]) -> Iterator[ClutterI
             " choose gp or knn"
         )
     traces = [default_session(True).simulate(request).trace for request in requests]
-    arm, num_axes = scenario.arm(), known.num_axes
+    arm = scenario.arm()
     layout = make_taxels(arm, scenario.scene.taxels_per_m)
-    felt = feel([trace for trace in traces if trace.q], arm, layout, float(radii[0]), num_axes)
+    felt = feel([trace for trace in traces if trace.q], arm, layout, float(radii[0]), known)
     first = int(requests[-1].key, 16) % 2**31
     draws = (scenario.sample_instance(STREAM, index).p_WO for index in count(first))
     while True:
@@ -131,8 +131,9 @@ def imagine(
 ) -> Vector:
     """Returns positions p_WO of n objects, shape (n, 3), metres, that agree with what was felt.
 
-    Objects are put where some were felt, the nearest ones of a kind. Those in the way of the arm or
-    of each other come from a further draw, and so on.
+    Objects are put where some were felt, the nearest ones of a kind. For those in the way of the
+    arm or of each other there may be room where further draws have some; else they are left out,
+    far away.
 
     Args:
         draws: Positions of the category, each shape (n, 3).
@@ -144,29 +145,36 @@ def imagine(
     p_WO = next(draws).copy()
     d = felt.still.shape[1]
     placed = np.zeros(len(p_WO), dtype=bool)
-    for centres, kind in ((felt.still, loose & ~movable), (felt.pushed, loose & movable)):
+    fixed = loose & ~movable
+    # Where all can yield, one that did not is jammed.
+    for centres, kind in (
+        (felt.still, fixed if np.any(fixed) else loose),
+        (felt.pushed, loose & movable),
+    ):
         for centre in centres:
             free = np.flatnonzero(kind & ~placed)
             if not len(free):
                 break
             nearest = free[np.argmin(np.linalg.norm(p_WO[free, :d] - centre, axis=1))]
             p_WO[nearest, :d], placed[nearest] = centre, True
-    for again in islice(draws, _MOST_DRAWS):
-        wrong = np.zeros(len(p_WO), dtype=bool)
-        wrong[loose] = _are_wrong(p_WO[loose, :d], radius, felt)
-        wrong &= ~placed
-        if not np.any(wrong):
+
+    def has_room(points: Vector) -> BoolVector:
+        apart = np.linalg.norm(points[:, np.newaxis, :d] - p_WO[placed, :d], axis=2)
+        apart_enough = apart.min(axis=1, initial=np.inf) >= 2.0 * radius
+        return np.asarray(apart_enough & (felt.gaps(points[:, :d]) >= radius - OVERLAP_M))
+
+    for i in np.flatnonzero(loose & ~placed):
+        placed[i] = has_room(p_WO[[i]])[0]
+    for again in islice(draws, _FURTHER_DRAWS):
+        for i in np.flatnonzero(loose & ~placed):
+            others = again[loose & (movable == movable[i])]
+            if np.any(room := has_room(others)):
+                p_WO[i], placed[i] = others[np.argmax(room)], True
+        if np.all(placed[loose]):
             break
-        p_WO[wrong] = again[wrong]
+    out = np.flatnonzero(loose & ~placed)
+    p_WO[out, 0] = FAR_M + 2.0 * radius * np.arange(len(out))
     return p_WO
-
-
-def _are_wrong(p_WO: Vector, radius: float, felt: Felt) -> BoolVector:
-    """Returns which of n objects are where the arm was, or overlap another one, shape (n,)."""
-    apart = np.linalg.norm(p_WO[:, np.newaxis] - p_WO, axis=2)
-    np.fill_diagonal(apart, np.inf)
-    wrong: BoolVector = (felt.gaps(p_WO) < radius - OVERLAP_M) | (apart.min(axis=1) < 2.0 * radius)
-    return wrong
 
 
 def race[T](

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from support.reaches import free_space, reach_request
-from support.worlds import ARM, cylinder, make_clutter
+from support.worlds import ARM, box, cylinder, make_clutter
 
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.control.taxels import make_taxels
@@ -24,9 +24,9 @@ def reach(
     return Environment(SCENARIO, instance, b0=np.array(b0)).reach(P_WG, x0).trace
 
 
-def felt(*traces: ReachTrace) -> Felt:
+def felt(*traces: ReachTrace, known: ClutterInstance | None = None) -> Felt:
     layout = make_taxels(ARM, SCENARIO.scene.taxels_per_m)
-    return feel(traces, ARM, layout, RADIUS, num_axes=2)
+    return feel(traces, ARM, layout, RADIUS, known or make_clutter())
 
 
 @pytest.mark.parametrize("base_y", [0.0, 0.1])
@@ -53,3 +53,14 @@ def test_nothing_is_where_the_arm_was() -> None:
     tip, aside = trace.p_WE[-1][:2], np.array([0.5, 0.9])
     gaps = found.gaps(np.array([tip, trace.p_WE[len(trace.p_WE) // 2][:2], aside]))
     assert np.all(gaps[:2] < 0.0) and gaps[2] > 0.3
+
+
+def test_what_is_known_is_not_taken_for_something_else() -> None:
+    wall = box(0.52, -0.09, (0.06, 0.1, 0.2), yaw=0.6)
+    trace = reach(make_clutter(wall))
+    assert max(trace.peak_force) > 3.0
+    assert len(felt(trace).still) > 0
+    found = felt(trace, known=make_clutter(wall))
+    assert len(found.still) == len(found.pushed) == 0
+    elsewhere = felt(trace, known=make_clutter(box(0.52, 0.5, (0.06, 0.1, 0.2))))
+    np.testing.assert_array_equal(elsewhere.still, felt(trace).still)

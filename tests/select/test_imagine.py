@@ -14,8 +14,8 @@ from lic_drake.evaluate.trial import Attempt, random_requests, run_trial
 from lic_drake.reach.scenario import Scenario, load_scenario
 from lic_drake.reach.sleeping import SkinAxes
 from lic_drake.select import imagine as module
-from lic_drake.select.felt import Felt
-from lic_drake.select.imagine import OVERLAP_M, imagine, imagined_environments, race
+from lic_drake.select.felt import OVERLAP_M, Felt
+from lic_drake.select.imagine import imagine, imagined_environments, race
 from lic_drake.select.registry import make_selector
 from lic_drake.select.situation import FailedReach, Situation
 from lic_drake.starts import make_starts
@@ -54,6 +54,26 @@ def test_imagined_objects_are_where_some_were_felt_and_not_where_the_arm_was(see
     # Most objects are as they were drawn.
     first = next(draws(1000 * seed))
     assert np.mean(np.all(p_WO == first, axis=1)) > 0.7
+
+
+def test_dense_clutter_is_imagined_without_overlaps() -> None:
+    scenario = load_scenario("sphere-aperture-clutter")
+    radius, arm = scenario.clutter.radius_m, scenario.arm()
+    instance = scenario.sample_instance("training", 0)
+    loose = np.array([shape == "sphere" for shape in instance.shape])
+    axes = SkinAxes(arm, 3)
+    q = arm.q_home + np.zeros((1, len(arm.q_min)))
+    ends = axes.ends(q[0]) + scenario.task.b0[:, np.newaxis]
+    pushed = np.array([[0.7, -0.3, 0.9], [0.68, -0.1, 0.8]])
+    felt = Felt(still=np.array([[0.7, -0.5, 0.9]]), pushed=pushed, axes=axes, ends=(ends,))
+    draws = (scenario.sample_instance("imagination", i).p_WO for i in range(100))
+    p_WO = imagine(draws, loose, instance.movable, radius, felt)[loose]
+    # Where all can yield, one that did not is among them.
+    for centre in (*felt.still, *pushed):
+        assert np.min(np.linalg.norm(p_WO - centre, axis=1)) == 0.0
+    apart = np.linalg.norm(p_WO[:, np.newaxis] - p_WO, axis=2) + np.eye(len(p_WO))
+    assert apart.min() >= 2.0 * radius
+    assert np.count_nonzero(p_WO[:, 0] > 1.0) <= 4  # So many may have found no room.
 
 
 def test_the_best_alternative_is_found_with_few_trials() -> None:
