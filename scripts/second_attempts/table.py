@@ -1,10 +1,11 @@
-"""Tabulates second attempts after failures of LIC-1: LIC-2 beside other choices.
+"""Tabulates second attempts after failures of LIC-1: LIC-2, where there is one, and other choices.
 
 python scripts/second_attempts/table.py
 """
 
 from pathlib import Path
 
+from lic_drake.estimate.features import features_of
 from lic_drake.evaluate.paper import TABLES
 from lic_drake.evaluate.statistics import count, mcnemar
 from lic_drake.evaluate.table import Table, rate_cells
@@ -24,6 +25,8 @@ NAMES = {
 VARIANT = IMAGINE
 """Trials of fewer goals, of what takes long."""
 
+PR2 = "sphere-aperture-clutter"
+
 
 def second_attempts_table(
     trials: TrialTable, category: str, estimator: str, variant: str = ""
@@ -31,7 +34,7 @@ def second_attempts_table(
     """Returns success of second attempts after LIC-1 with an estimator failed.
 
     All choices follow the same failures and find the environment as these left it; McNemar's
-    paired test compares each with LIC-2.
+    paired test compares each with LIC-2, or else with LIC-1's.
 
     Args:
         trials: Trials of two attempts.
@@ -40,21 +43,24 @@ def second_attempts_table(
         variant: Of the trials.
     """
     failed = ~trials.success(estimator, 1, variant)
-    lic_2 = trials.success(estimator, 2, variant)[failed]
+    usual = trials.success(estimator, 2, variant)[failed]
+    has_lic_2 = features_of(category).second is not None
     rows = []
     for pattern, name in NAMES.items():
         method = pattern.format(estimator)
         # All of these methods have this LIC-1's first attempt, but imagine, which has the GP's.
         if method in trials.methods(variant) and (method != IMAGINE or estimator == "gp"):
             won = trials.success(method, 2, variant)[failed]
-            p = "" if method == estimator else f"{mcnemar(won, lic_2):.2g}"
+            p = "" if method == estimator else f"{mcnemar(won, usual):.2g}"
+            if method == estimator and not has_lic_2:
+                name = NAMES["{}1"]
             rows.append((name, *rate_cells(count(won)), p))
     return Table(
         caption=f"Second attempts in {category} after failures of LIC-1 ({estimator}) at"
         f" {len(failed):,} goals.",
         heading=(
             *("second choice", "success, %", "Wilson 90 % interval", "count"),
-            "McNemar's p against LIC-2",
+            f"McNemar's p against LIC-{2 if has_lic_2 else 1}",
         ),
         rows=tuple(rows),
     )
@@ -68,6 +74,7 @@ def write(results: Path) -> list[Path]:
         tables += [second_attempts_table(trials, category, name) for name in ("gp", "knn")]
         if VARIANT in trials.variants:
             tables.append(second_attempts_table(trials, category, "gp", VARIANT))
+    tables.append(second_attempts_table(load_trials(results, PR2), PR2, "gp"))
     return write_tables(results, "second_attempts", tables)
 
 

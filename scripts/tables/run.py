@@ -23,7 +23,9 @@ from lic_drake.evaluate.statistics import count, mcnemar
 from lic_drake.evaluate.table import Table, rate_cells
 from lic_drake.evaluate.trials import TrialTable
 from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.select.registry import IMAGINE
 from lic_drake.types import BoolVector
+from scripts.bounds.race import reached
 from scripts.common import load_trials, run_tables, write_tables
 
 NUMBERS = {
@@ -40,21 +42,27 @@ ARMS = {
 }
 """Folders of trials before the same boards, by arm."""
 
+FOLIAGE = "foliage-aperture-clutter"
+
 PARTS = (("1st attempt", 1), ("total of two", 2))
 RATE_HEADS = ("success, %", "90 % interval", "count")
+CEILING = "any start known to reach"
 SUCCESS_HEADS = (*RATE_HEADS, "p against RND", "p against COST")
 
 
-def pr2_table(trials: TrialTable) -> Table:
+def pr2_table(trials: TrialTable, reachable: BoolVector) -> Table:
     """Returns the PR2's success before spheres, which the paper only demonstrates (V-B).
 
     Args:
         trials: Trials of two attempts, with the variant "still" where base and torso stay.
+        reachable: Where any start is known that reaches the goal, shape (environments,).
     """
     rows: list[tuple[str, ...] | None] = []
     for variant, stand in (("", "move along the board"), ("still", "stay")):
-        methods = [m for m in METHODS if m in trials.methods(variant)]
+        methods = [m for m in (*METHODS, IMAGINE) if m in trials.methods(variant)]
         rows += success_rows(trials, stand, [(label(m), m, variant) for m in methods])
+        if not variant:
+            rows.append((stand, "", CEILING, *rate_cells(count(reachable)), "", ""))
     return Table(
         caption="The PR2 in sphere-aperture-clutter with 10 of 20 apertures blocked: unseen"
         " environments with a random goal each, the same for all strategies. Intervals are"
@@ -109,11 +117,12 @@ def arms_table(trials: Mapping[str, TrialTable]) -> Table:
     )
 
 
-def foliage_table(trials: TrialTable) -> Table:
+def foliage_table(trials: TrialTable, reachable: BoolVector) -> Table:
     """Returns the PR2's success before foliage, which the paper demonstrates once (V-B).
 
     Args:
         trials: Trials of two attempts by variant: what is known, and where it was learned.
+        reachable: Where any start is known that reaches the goal, shape (environments,).
     """
     rows: list[tuple[str, ...] | None] = []
     for known, words in (("cameras", "seen by cameras"), ("known", "known")):
@@ -124,6 +133,7 @@ def foliage_table(trials: TrialTable) -> Table:
             if method in trials.methods(variant)
         ]
         rows += success_rows(trials, words, strategies)
+    rows.append((words, "", CEILING, *rate_cells(count(reachable)), "", ""))
     return Table(
         caption="The PR2 before foliage, 8 of 20 apertures covered, 2 of them in part: unseen"
         " environments with a random goal each, the same for all strategies. Base and torso move."
@@ -183,11 +193,14 @@ def write(results: Path) -> list[Path]:
     tables = paper_tables(results)
     spheres = load_trials(results, "sphere-aperture-clutter")
     every = ExperienceLibrary(results / "bounds" / "sphere-aperture-clutter" / "random")
-    tables["table_pr2"] = [pr2_table(spheres), oracle_table(spheres, every)]
+    reachable = reached(results, "sphere-aperture-clutter", len(spheres.pairs()))
+    tables["table_pr2"] = [pr2_table(spheres, reachable), oracle_table(spheres, every)]
     there = {arm: folder for arm, folder in ARMS.items() if (results / folder).exists()}
     arms = {arm: load_trials(results, folder) for arm, folder in there.items()}
     tables["table_arms"] = [arms_table(arms)]
-    tables["table_foliage"] = [foliage_table(load_trials(results, "foliage-aperture-clutter"))]
+    foliage = load_trials(results, FOLIAGE)
+    reachable = reached(results, FOLIAGE, len(foliage.pairs("known")))
+    tables["table_foliage"] = [foliage_table(foliage, reachable)]
     return [p for name, parts in tables.items() for p in write_tables(results, name, parts)]
 
 

@@ -57,7 +57,8 @@ def test_rates_counts_and_paired_tests_of_the_pr2_are_those_of_the_trials() -> N
         "gp": ["1"] * 7 + ["01"] * 3,
     }
     rows = [row for method, texts in outcomes.items() for row in make_rows(method, texts)]
-    table = pr2_table(TrialTable([*rows, *make_rows("gp", ["1", "00"], variant="still")]))
+    still = make_rows("gp", ["1", "00"], variant="still")
+    table = pr2_table(TrialTable([*rows, *still]), np.arange(10) < 8)
     cells = {row[:3]: row[3:] for row in table.rows if row is not None}
     moves = "move along the board"
     assert cells[moves, "1st attempt", "LIC(GP)"][::2] == ("70.0", "7/10", "0.031")
@@ -65,6 +66,7 @@ def test_rates_counts_and_paired_tests_of_the_pr2_are_those_of_the_trials() -> N
     p = mcnemar(np.ones(10, dtype=bool), np.arange(10) == 0)
     assert cells[moves, "total of two", "LIC(GP)"][4] == f"{p:.2g}"
     assert cells["stay", "total of two", "LIC(GP)"][2:] == ("1/2", "", "")
+    assert cells[moves, "", "any start known to reach"][2:] == ("8/10", "", "")
 
 
 def test_arms_stand_below_each_other_each_with_its_own_baselines() -> None:
@@ -93,7 +95,9 @@ def test_what_was_learned_among_foliage_stands_beside_spheres_and_baselines() ->
         *make_rows("gp", ["1"] * 8 + ["00"] * 2, variant="cameras-foliage"),
         *make_rows("cost", ["1"] + ["00"] * 9, variant="known"),
     ]
-    cells = {row[:3]: row[3:] for row in foliage_table(TrialTable(rows)).rows if row is not None}
+    table = foliage_table(TrialTable(rows), np.arange(10) < 9)
+    cells = {row[:3]: row[3:] for row in table.rows if row is not None}
+    assert cells["known", "", "any start known to reach"][2] == "9/10"
     seen = "seen by cameras"
     assert cells[seen, "total of two", "LIC(GP), spheres"][2] == "7/10"
     # Against RND of the same condition, though its variant is another one.
@@ -114,6 +118,16 @@ def test_second_choices_are_counted_on_the_failures_of_lic_1() -> None:
     assert [row[3] for row in rows] == ["3/5", "2/5"]
     won = [trials.success(m, 2)[1:] for m in ("gp>cost", "gp")]
     assert float(rows[1][4]) == pytest.approx(mcnemar(*won), rel=0.05)
+
+
+def test_where_there_is_no_lic_2_others_are_compared_with_lic_1() -> None:
+    rows = [*make_rows("gp", ["01", "00", "00"]), *make_rows("imagine", ["01", "01", "00"])]
+    table = second_attempts_table(TrialTable(rows), "sphere-aperture-clutter", "gp")
+    assert [row[0] for row in table.rows] == [
+        "LIC-1's best away from the first",
+        "best in imagined environments",
+    ]
+    assert [row[3] for row in table.rows] == ["1/3", "2/3"] and "LIC-1" in table.heading[-1]
 
 
 def small_records(results: Path, category: str) -> Path:
