@@ -60,7 +60,7 @@ def test_a_notebook_says_what_one_learns_and_ends_with_something_to_try(name: st
     first, *_, last = read(name).cells
     assert first.source.startswith(f"# {name[0]}. ")
     assert first.source.partition("\n\n")[2].startswith("You will ")
-    assert re.search(r"\*\*Try:\*\* [^*]*\?$|\*\*Try:\*\* .*\?", last.source, re.DOTALL)
+    assert re.search(r"\*\*Try:\*\* .*\?", last.source, re.DOTALL)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -96,15 +96,8 @@ def test_files_that_are_shown_are_stored_as_they_are(name: str) -> None:
     files.append(checkout / "scripts" / "examples" / "own_controller.py")
     texts = {path.read_text(encoding="utf-8") for path in files if path.is_file()}
     shown = [output for cell in read(name).cells for output in cell.get("outputs", [])]
-    blocks = re.findall(
-        r"^```\w+\n(.*?)```$",
-        "\n".join(
-            output.data["text/markdown"]
-            for output in shown
-            if "data" in output and "text/markdown" in output.data
-        ),
-        re.DOTALL | re.MULTILINE,
-    )
+    markdown = [output.get("data", {}).get("text/markdown", "") for output in shown]
+    blocks = re.findall(r"^```\w+\n(.*?)```$", "\n".join(markdown), re.DOTALL | re.MULTILINE)
     assert blocks and set(blocks) <= texts
 
 
@@ -372,5 +365,5 @@ def test_a_notebook_s_recording_shows_a_scene(
     page.write_text(f"<!DOCTYPE html><body>{frame}</body>", encoding="utf-8")
     image, console = visit(chromium, f"file://{page}", tmp_path)
     assert console == []
-    # Of the goal behind a board only the pole is seen.
-    assert_shows_a_scene(image[60:], 1e-5 if "pr2" in name else 5e-5)
+    # Of a goal behind clutter or a board only the pole is seen.
+    assert_shows_a_scene(image[60:], 1e-5)
