@@ -21,12 +21,10 @@ lint: $(STAMP)
 	$(PYTHON_IN_VENV) -m ruff format --check .
 	$(PYTHON_IN_VENV) -m mypy
 
-# The top level exports the API only, so its rooms are named for pdoc.
-ROOMS = $(subst /,.,$(patsubst %/__init__.py,%,$(wildcard lic_drake/*/__init__.py)))
-
-# Reference pages from the docstrings, out/docs/index.html; a warning is an error.
+# The pages, the lesson and the reference from the docstrings, out/docs/index.html; a warning or a
+# link that leads nowhere is an error.
 docs: $(STAMP)
-	$(PYTHON_IN_VENV) -W error -m pdoc --docformat google --output-directory out/docs lic_drake $(ROOMS)
+	$(PYTHON_IN_VENV) -W error scripts/docs/run.py out/docs
 
 # All notebooks, run as they are, with their outputs in out/notebooks; one that fails is an error.
 notebooks: $(STAMP)

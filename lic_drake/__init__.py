@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from lic_drake.estimate.estimator import SuccessEstimator as SuccessEstimator
     from lic_drake.estimate.estimator import from_sklearn as from_sklearn
     from lic_drake.estimate.registry import register_estimator as register_estimator
+    from lic_drake.evaluate.robot_check import check_robot as check_robot
     from lic_drake.evaluate.trial import Evaluation as Evaluation
     from lic_drake.evaluate.trial import run_evaluation as run_evaluation
     from lic_drake.evaluate.trial import run_trial as run_trial
@@ -68,6 +69,7 @@ _HOMES = {
     "Starts": "reach.start",
     "SuccessEstimator": "estimate.estimator",
     "category_names": "clutter.registry",
+    "check_robot": "evaluate.robot_check",
     "collect": "experience.collect",
     "densities_figure": "show.density",
     "draw_aperture_map": "show.apertures",

@@ -9,7 +9,7 @@ from lic_drake.errors import LicError
 VARIABLE = "LIC_EXTENSIONS"
 """Environment variable with the names of modules to import, separated by commas."""
 GROUP = "lic_drake"
-"""Entry points of installed packages: modules to import, see notebooks/extend.ipynb."""
+"""Entry points of installed packages: modules to import, see notebooks/8_extend.ipynb."""
 
 
 class Registry[T]:

@@ -1,6 +1,6 @@
 """Runs notebooks in place and keeps their outputs, all but the large ones; or into a folder.
 
-Usage: python scripts/run_notebooks.py [--out FOLDER] notebooks/one_reach.ipynb ...
+Usage: python scripts/run_notebooks.py [--out FOLDER] notebooks/2_one_reach.ipynb ...
 """
 
 import argparse

@@ -6,7 +6,6 @@ from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 from lic_drake.control.mpc import HapticMpc, MpcConfig, MpcInput
 from lic_drake.control.taxels import TaxelLayout
 from lic_drake.robots.arm import Arm
-from lic_drake.types import Vector
 
 
 class HapticMpcController(LeafSystem):
@@ -17,7 +16,7 @@ class HapticMpcController(LeafSystem):
         taxel_force: Normal force on each taxel, size num_taxels, N, compression positive.
         goal: p_RG, size 3, metres.
     Output port:
-        desired_state: [q_d, 0], size 2 m, rad and rad/s, held between control steps.
+        desired_state: [q_d, 0], size 2 m, rad and rad/s, held between control steps: its state.
     """
 
     def __init__(self, arm: Arm, layout: TaxelLayout, config: MpcConfig) -> None:
@@ -31,10 +30,6 @@ class HapticMpcController(LeafSystem):
         self._desired = int(desired)
         self.DeclareStateOutputPort("desired_state", desired)
         self.DeclarePeriodicDiscreteUpdateEvent(config.period_s, 0.0, self._update)
-
-    def set_equilibrium(self, context: Context, q_d: Vector) -> None:
-        """Sets the equilibrium angles, shape (m,), radians, in a context of this system."""
-        context.SetDiscreteState(self._desired, np.append(q_d, np.zeros_like(q_d)))
 
     def _update(self, context: Context, discrete_state: DiscreteValues) -> None:
         m = self._arm.num_joints

@@ -29,8 +29,8 @@ class ExperienceLibrary:
     """Reaches of one scenario: a folder of shards, or a single Parquet file.
 
     Nothing is cached: each call reads the current files, and raises a LibraryError if there are
-    none, one is damaged, or they hold different scenarios. `pandas.read_parquet` also opens the
-    folder. Shards are only added or replaced as a whole.
+    none, one is damaged, or they hold different scenarios. `pandas.read_parquet` opens the list of
+    `shard_paths`. Shards are only added or replaced as a whole.
 
     Attributes:
         path: The folder or file.

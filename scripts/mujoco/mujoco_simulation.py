@@ -35,7 +35,7 @@ class MujocoSimulation(Simulation):
         self.data.qpos[self._joints] = q
         self.data.ctrl[:] = q
         self._context = self._controller.CreateDefaultContext()
-        self._controller.set_equilibrium(self._context, q)
+        self._context.SetDiscreteState(np.append(q, np.zeros_like(q)))
         self._controller.GetInputPort("goal").FixValue(self._context, p_RG)
         self.sense()
 

@@ -25,7 +25,7 @@ def test_the_desired_state_is_one_mpc_step_on_with_no_velocity(preset: str) -> N
     controller.GetInputPort("arm_state").FixValue(context, np.append(Q, np.zeros(3)))
     controller.GetInputPort("taxel_force").FixValue(context, forces)
     controller.GetInputPort("goal").FixValue(context, GOAL)
-    controller.set_equilibrium(context, q_d)
+    context.SetDiscreteState(np.append(q_d, np.zeros(3)))
     # Taxels and Jacobians by Drake-free formulas of their own: planar geometry, link by link.
     contacts = []
     for taxel in (60, 140, 181):

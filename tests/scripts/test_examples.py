@@ -17,6 +17,7 @@ SHOWN = {
     "own_estimator": "the forest chooses",
     "own_constraint": "bound: b0",
     "own_category": "reached",
+    "own_controller": "Yielding: ",
 }
 
 PARTS = {"cylinder-clutter": 1, "passage-clutter": 12}
