@@ -107,8 +107,7 @@ def read_rollouts(
     groups = np.arange(len(y)) if group is None else _groups(table, group)
     if len(np.unique(groups)) < 2:
         raise EstimateError(
-            f"all rows are of one group of column {group}, so nothing can be held out; add rollouts"
-            " in other scenes"
+            f"all rows are of one {group}, so nothing can be held out; add rollouts of others"
         )
     for name, column in zip([*given, *decide], X.T, strict=True):
         if name in decide and np.ptp(column) == 0.0:
@@ -158,9 +157,11 @@ def _check_outcomes(y: Vector, name: str) -> None:
     wrong = y[(y != 0.0) & (y != 1.0)]
     if len(wrong):
         raise EstimateError(
-            f"{name} is {wrong[0]:g} in one of {len(wrong)} rows where it is neither 0 nor 1; write"
-            " 1 for success, 0 for failure"
+            f"{len(wrong)} of {len(y)} rows have a {name} other than 0 and 1, such as {wrong[0]:g};"
+            " write 1 for success, 0 for failure"
         )
     if np.all(y == y[:1]):
-        what = "no rows" if not len(y) else f"only {'successes' if y[0] else 'failures'}"
-        raise EstimateError(f"there are {what} in {len(y)} rows; both outcomes are needed to learn")
+        kind = "successes" if np.any(y) else "failures"
+        raise EstimateError(
+            f"all {len(y)} rows are {kind}, from which nothing can be learned; add some others"
+        )

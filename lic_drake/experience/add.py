@@ -42,6 +42,8 @@ def read_table(path: Path) -> pa.Table:
     read = {".csv": pyarrow.csv.read_csv, SUFFIX: pq.read_table}.get(path.suffix)
     if read is None:
         raise LibraryError(f"rows are read from a .csv or {SUFFIX} file, got {path}")
+    if not path.is_file():
+        raise LibraryError(f"there is no file {path}; check its name")
     try:
         table = read(path)
     except (OSError, pa.ArrowException) as error:
