@@ -23,11 +23,11 @@ def add_parser(subparsers: Subparsers) -> None:
         "learn from any table of rollouts what to decide",
         "Reads a CSV or Parquet file with one attempt a row, of any robot and any task. Columns are"
         " taken as they are, in any unit; give an angle that wraps around as its sine and cosine."
-        " With --at it prints the decision that most probably succeeds there, within the ranges"
-        " that the table has, and the probability, with its 90 % interval, that choices with such"
-        " an estimate succeed. That is learned from choices in groups that were held out, five"
-        " parts in turn: there the choice is the best of the attempts that were made. Without --at"
-        " it only says what was learned.",
+        " With --at it prints the decision with the highest estimate there, within the ranges that"
+        " the table has, and the probability, with its 90 % interval, that choices with such an"
+        " estimate succeed. Those choices are attempts of the table: a fifth of the scenes at a"
+        " time is not learned from; of five or more attempts of it in like situations, the one with"
+        " the highest estimate is a choice. Without --at it only says what was learned.",
         "lic fit rollouts.parquet --decide base_x base_y --given object_x object_y --group scene"
         " --at object_x=0.4 object_y=0.6 --map map.png",
         ["--json"],
@@ -53,8 +53,8 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--group",
         metavar="COLUMN",
-        help="column that is equal in attempts of one scene, whose outcomes are alike (default:"
-        " each row is a scene of its own)",
+        help="column that is equal in attempts of one scene; without it, scenes that have several"
+        " make the probability too high (default: each row is a scene of its own)",
     )
     parser.add_argument(
         "--method",

@@ -18,7 +18,7 @@ _FEWEST_LIKE = 5
 """Attempts among which one is the best of a set, as a decision is the best of many."""
 
 _MAX_TRIED = 2000
-_NUM_IMPROVED = 8
+_NUM_IMPROVED = 4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,7 +30,9 @@ class Decision:
         values: The decision.
         estimate: Of P(success), the highest of all decisions and so rather too high.
         probability: How often choices with such an estimate succeed; None: not known.
-        interval: Its 90 % interval.
+        interval: 90 % interval of that rate. It holds what few choices leave open, not that a
+            decision found by optimisation is better, or worse, than the best of some that were
+            tried.
     """
 
     at: dict[str, float]
