@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from lic_drake.estimate.estimator import SuccessEstimator as SuccessEstimator
     from lic_drake.estimate.estimator import from_sklearn as from_sklearn
     from lic_drake.estimate.registry import register_estimator as register_estimator
+    from lic_drake.estimate.rollouts import read_rollouts as read_rollouts
+    from lic_drake.evaluate.decisions import fit_rollouts as fit_rollouts
     from lic_drake.evaluate.robot_check import check_robot as check_robot
     from lic_drake.evaluate.trial import Evaluation as Evaluation
     from lic_drake.evaluate.trial import run_evaluation as run_evaluation
@@ -76,12 +78,14 @@ _HOMES = {
     "draw_snapshot": "show.views",
     "draw_view": "show.views",
     "estimate_apertures": "show.apertures",
+    "fit_rollouts": "evaluate.decisions",
     "from_sklearn": "estimate.estimator",
     "instance_of": "reach.session",
     "load_scenario": "reach.scenario",
     "make_reach_diagram": "reach.diagram",
     "make_selector": "select.registry",
     "make_starts": "starts",
+    "read_rollouts": "estimate.rollouts",
     "register_category": "clutter.registry",
     "register_estimator": "estimate.registry",
     "register_robot": "robots.registry",

@@ -72,7 +72,7 @@ class GaussianProcess(SuccessEstimator):
         if len(rows.X) > _MAX_ROWS:
             raise EstimateError(
                 f"an exact Gaussian process takes at most {_MAX_ROWS} distinct rows, got"
-                f" {len(rows.X)}; use the estimator 'knn'"
+                f" {len(rows.X)}; use the estimator 'knn' (--method knn)"
             )
         chosen = self.hyperparameters
         # On a busy machine OpenBLAS threads waiting for each other turned 2 s into minutes.

@@ -37,18 +37,25 @@ _UNOBSERVED: dict[str, Any] = {
 """Values of the columns that rows do not have."""
 
 
-def read_rows(path: Path) -> list[dict[str, object]]:
-    """Reads the rows of a CSV or Parquet file, for `add_rows`."""
+def read_table(path: Path) -> pa.Table:
+    """Reads a CSV or Parquet file, whose column names lose blanks around them."""
     read = {".csv": pyarrow.csv.read_csv, SUFFIX: pq.read_table}.get(path.suffix)
     if read is None:
         raise LibraryError(f"rows are read from a .csv or {SUFFIX} file, got {path}")
+    if not path.is_file():
+        raise LibraryError(f"there is no file {path}; check its name")
     try:
         table = read(path)
     except (OSError, pa.ArrowException) as error:
         reason = " ".join(str(error).split())[:200]
         raise LibraryError(f"cannot read {path} as {path.suffix[1:]} ({reason})") from None
-    rows: list[dict[str, object]] = table.to_pylist()
-    return [{name.strip(): value for name, value in row.items()} for row in rows]
+    return table.rename_columns([name.strip() for name in table.column_names])
+
+
+def read_rows(path: Path) -> list[dict[str, object]]:
+    """Reads the rows of a CSV or Parquet file, for `add_rows`."""
+    rows: list[dict[str, object]] = read_table(path).to_pylist()
+    return rows
 
 
 def add_rows(

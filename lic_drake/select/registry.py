@@ -3,13 +3,13 @@
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lic_drake.errors import RequestError
-from lic_drake.estimate.features import FeatureMap, features_of
+from lic_drake.estimate.features import PLANAR_LIC1, ExperienceRows, FeatureMap, features_of
 from lic_drake.estimate.registry import estimator_names, make_estimator
 from lic_drake.experience.pairs import pair_reaches
 from lic_drake.robots.arm import Arm
@@ -17,6 +17,9 @@ from lic_drake.select.baselines import CostSelector, RandomSelector
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.objective import SuccessModel
 from lic_drake.select.situation import Selection, Situation
+
+if TYPE_CHECKING:
+    from lic_drake.estimate.estimator import SuccessEstimator
 
 IMAGINE = "imagine"
 """Name of the strategy that imagines the clutter, see `lic_drake.select.imagine`."""
@@ -134,17 +137,32 @@ def fit_model(
 ) -> SuccessModel:
     """Returns an estimator fitted to a library D1, or to pairs D2 where features observe a reach.
 
+    See `fit_rows`.
+    """
+    kind = "pairs of reaches" if features.observed else "reaches"
+    rows, what = features.rows(columns), f"{kind} of {category}"
+    return SuccessModel(estimator=fit_rows(estimator, rows, what, features, say), features=features)
+
+
+def fit_rows(
+    estimator: str,
+    rows: ExperienceRows,
+    what: str,
+    features: FeatureMap = PLANAR_LIC1,
+    say: Callable[[str], None] = _silent,
+) -> "SuccessEstimator":
+    """Returns an estimator fitted to rows; `what` says in a line what they are.
+
     Its settings come from the simulated rows; those of other sources change the estimate, by their
     weight, but no setting. Fits are kept, see `lic_drake.estimate.kept`, and found again.
     """
     from lic_drake.estimate.kept import fit_as_kept, keep_fit, kept_path
 
-    rows, fitted = features.rows(columns), make_estimator(estimator, features)
+    fitted = make_estimator(estimator, features)
     path, part = kept_path(estimator, features, rows), rows.simulated
     if path is not None and fit_as_kept(path, fitted, rows, say):
-        return SuccessModel(estimator=fitted, features=features)
-    kind = "pairs of reaches" if features.observed else "reaches"
-    say(f"fitting {estimator} on {len(rows.y)} {kind} of {category} ...")
+        return fitted
+    say(f"fitting {estimator} on {len(rows.y)} {what} ...")
     began = time.perf_counter()
     if part.all() or not part.any():  # Without any simulated row all choose the settings.
         fitted.fit(rows.X, rows.y, rows.groups, rows.weight)
@@ -154,4 +172,4 @@ def fit_model(
     say(f"fitted {estimator} in {time.perf_counter() - began:.1f} s")
     if path is not None:
         keep_fit(path, fitted, say)
-    return SuccessModel(estimator=fitted, features=features)
+    return fitted

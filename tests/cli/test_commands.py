@@ -91,6 +91,7 @@ def test_what_a_machine_may_read_comes_as_json() -> None:
     with_json = {name for name, parser in LEAVES if "--json" in parser._option_string_actions}
     assert with_json == {
         *("lic reach", "lic select", "lic collect", "lic evaluate", "lic gallery", "lic bench"),
+        "lic fit",
         *("lic experience info", "lic experience check", "lic robot check", "lic train"),
     }
 
@@ -115,6 +116,7 @@ WRONG = [
     ("select --goal 0.6 0.1 --method jungle", "choose one of"),
     ("select --goal 0.6 0.1 --library {none}", "make one with: lic collect"),
     ("select --goal inf 0.1", "finite"),
+    ("fit {file} --decide a --given b", "from a .csv or .parquet file"),
     ("collect {file}/below", "cannot create the folder"),
     ("collect {none} --share 3/2", "share"),
     ("collect {none} --environments 0", "from 1 to"),

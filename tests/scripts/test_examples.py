@@ -1,5 +1,6 @@
 """The example programs run, and print what they are there to show."""
 
+import re
 import runpy
 from pathlib import Path
 
@@ -25,7 +26,7 @@ PARTS = {"cylinder-clutter": 1, "passage-clutter": 12}
 
 
 def test_every_example_is_run():
-    assert set(SHOWN) == {path.stem for path in EXAMPLES.glob("[a-z]*.py")}
+    assert {*SHOWN, "rollouts"} == {path.stem for path in EXAMPLES.glob("[a-z]*.py")}
 
 
 @pytest.fixture
@@ -54,3 +55,13 @@ def test_it_runs(name, registries_restored, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     runpy.run_path(str(EXAMPLES / f"{name}.py"), run_name="__main__")
     assert SHOWN[name] in capsys.readouterr().out
+
+
+def test_bases_that_a_table_teaches_reach_more_and_as_often_as_expected(
+    tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    runpy.run_path(str(EXAMPLES / "rollouts.py"), run_name="__main__")
+    at_random, chosen, expected = map(int, re.findall(r"(\d+)%", capsys.readouterr().out))
+    assert chosen > at_random + 20
+    assert abs(chosen - expected) < 10
