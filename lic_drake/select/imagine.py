@@ -47,10 +47,15 @@ class ImaginingSelector:
     size; what is fixed around them, as a board, has to be known.
     """
 
-    def __init__(self, lic: LicSelector, method: str = "imagine") -> None:
-        """Sets up a selector; LIC-2's choice, if there is one, is among what is tried."""
+    def __init__(
+        self, lic: LicSelector, method: str = "imagine", say: Callable[[str], None] = print
+    ) -> None:
+        """Sets up a selector; LIC-2's choice, if there is one, is among what is tried.
+
+        `say` receives a line before every choice that takes long.
+        """
         self._lic, self._elsewhere = lic, LicSelector(lic.first)
-        self.method = method
+        self.method, self._say = method, say
 
     def select(self, situation: Situation) -> Selection:
         """Returns the start that reached the goal most often.
@@ -62,6 +67,8 @@ class ImaginingSelector:
         if not situation.failed:
             return replace(self._lic.select(situation), method=self.method)
         requests = requests_of(situation)
+        trials = sum(keep * further for keep, further in ROUNDS)
+        self._say(f"imagining the clutter from what was felt: {trials} reaches ...")
         starts, estimates = self._candidates(situation)
         scenario, diagrams = requests[-1].scenario, default_session(True).diagrams
 

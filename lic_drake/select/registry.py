@@ -99,7 +99,7 @@ def make_selector(
         columns: Columns of the experience library, if it learns from one.
         rng: Source of draws for RND; by default always the same ones.
         category: Clutter category, which says what LIC observes.
-        say: Receives a line before and after each fit.
+        say: Receives a line before and after each fit, and before what else takes long.
 
     Raises:
         RequestError: The strategy is unknown or has no library to learn from.
@@ -118,7 +118,7 @@ def make_selector(
 
         lic = make_selector("gp", arm, columns, rng, category, say)
         assert isinstance(lic, LicSelector)
-        return ImaginingSelector(lic)
+        return ImaginingSelector(lic, say=say)
     features, estimator, second = features_of(category), method, None
     if method not in estimator_names():
         estimator = method[:-1]

@@ -2,8 +2,8 @@
 
     python scripts/real_experience/run.py
 
-The "real" world is simulated, too: passages whose walls run straight ahead, -10 to 10 degrees from
-+x, where those of the library lean to the left by 5 to 35 degrees (paper VII). An interrupted run
+The "real" world is simulated, too: passages whose walls run 0 to 20 degrees to the left of +x,
+where those of the library run 15 to 60 degrees to the left of it (paper VII). An interrupted run
 can be resumed.
 """
 
@@ -35,7 +35,7 @@ from scripts.common import (
 )
 
 CATEGORY = "passage-clutter"
-REAL = "{clutter: {min_slope_deg: -10.0, max_slope_deg: 10.0}}"
+REAL = "{clutter: {min_slope_deg: 0.0, max_slope_deg: 20.0}}"
 METHOD = "gp1"
 
 
@@ -110,8 +110,8 @@ def success_table(counts: dict[Learned, Count], random: Count) -> Table:
         for point, result in ordered
     ]
     return Table(
-        caption=f"First attempts in {CATEGORY} whose walls run -10 to 10 degrees from +x, after"
-        " learning from a simulation in which they run 5 to 35 degrees from it and from"
+        caption=f"First attempts in {CATEGORY} whose walls run 0 to 20 degrees from +x, after"
+        " learning from a simulation in which they run 15 to 60 degrees from it and from"
         " records of random starts.",
         heading=("real records", "weight", "success, %", "Wilson 90 % interval", "count"),
         rows=(*rows, ("random starts", "", *rate_cells(random))),

@@ -113,12 +113,14 @@ def test_a_further_attempt_is_chosen_in_imagined_environments(
     scenario = load_scenario(category, "{stop: {timeout_s: 0.3}}")
     library = planar_library(tmp_path / "library", scenario)
     situation, attempt = fail(scenario)
+    said: list[str] = []
+    learned = (library.columns(), None, category, said.append)
     answers = [
-        make_selector("imagine", scenario.arm(), library.columns(), category=category).select(
-            situation
-        )
-        for _ in range(2)
+        make_selector("imagine", scenario.arm(), *learned).select(situation) for _ in range(2)
     ]
+    assert [line for line in said if "imagining" in line] == [
+        "imagining the clutter from what was felt: 5 reaches ..."
+    ] * 2
     assert answers[0].method == "imagine" and 0.0 <= (answers[0].probability or -1.0) <= 1.0
     assert answers[0].start == answers[1].start != attempt.request.start
     # What is fixed around the objects is known, nothing else.
