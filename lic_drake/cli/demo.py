@@ -86,6 +86,7 @@ def run(args: argparse.Namespace) -> int:
     foliage, meshes = category == _FOLIAGE, args.visuals == "drake_models"
     # Libraries of a robot other than the category's own have its name, too.
     robot = "" if load_scenario(category).robot == args.robot else args.robot
+    load_scenario(category, with_robot("", robot))  # Refuses an arm of the plane in space.
     overrides = overrides_of(args, category)
     # In foliage, experience comes from spheres: the demonstration is about transfer (paper V-B).
     learned = _SPHERES if foliage else category
@@ -99,6 +100,11 @@ def run(args: argparse.Namespace) -> int:
     scenario = library.scenario()
     if args.robot and get_robot(args.robot).digest != scenario.arm().digest:
         raise LicError(f"{library.path} is for --robot {scenario.robot}, not {args.robot}")
+    if args.category and not foliage and args.category != scenario.category:
+        raise LicError(
+            f"{library.path} is of {scenario.category}, not --category {args.category}; choose"
+            " another --library or omit --category"
+        )
     scenario = parse_scenario(scenario_text(scenario), overrides, source="--set")
     if foliage:
         scenario = load_scenario(category, with_robot(overrides, scenario.robot))
@@ -124,20 +130,22 @@ def run_gallery(args: argparse.Namespace) -> int:
     from lic_drake.experience.schema import write_atomically
     from lic_drake.experience.store import ExperienceLibrary
     from lic_drake.select.registry import check_method
-    from lic_drake.show.gallery import choose_exhibits, make_gallery, numbers_of
+    from lic_drake.show.gallery import STREAM, choose_exhibits, make_gallery, numbers_of
 
     check_method(args.method)
     check_writable(args.out)
+    path = args.out / "index.html"
+    if path.is_dir():
+        raise LicError(f"cannot write {path}: it is a folder; delete it or choose another OUT")
     paths = [args.library] if args.library else shipped_libraries()
     libraries = [ExperienceLibrary(path) for path in paths]
     for library in libraries:  # Fails before the first one is learned from.
-        library.scenario()
+        library.scenario().sample_goal(STREAM, args.seed)
     exhibits = [
         exhibit
         for library in libraries
         for exhibit in choose_exhibits(library, args.method, args.each, args.seed, say=remark)
     ]
-    path = args.out / "index.html"
     page = make_gallery(exhibits, args.method)
     write_atomically(path, lambda temporary: temporary.write_text(page, encoding="utf-8"))
     trials = [
