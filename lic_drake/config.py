@@ -3,14 +3,14 @@
 import dataclasses
 import math
 import sys
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 import yaml
 
-from lic_drake.errors import LicError, ScenarioError
+from lic_drake.errors import LicError, ScenarioError, quoted
 
 MAX_YAML_BYTES = 1_000_000
 """Maximum size of a YAML text; ours are a tenth of it."""
@@ -125,17 +125,40 @@ def read_section[T](schema: type[T], data: Any, source: str, defaults: T | None 
 
     if data is not None and not isinstance(data, dict):
         raise ScenarioError(f"{source} must be a YAML mapping, got {data!r}")
-    try:
+
+    def read(values: dict[str, Any]) -> T:
+        start = schema() if defaults is None else defaults
         # Drake's reader takes text only.
-        section: T = yaml_load_typed(  # type: ignore[no-untyped-call]
-            schema=schema,
-            data=yaml.safe_dump(data or {}),
-            defaults=schema() if defaults is None else defaults,
-        )
+        text = yaml.safe_dump(values)
+        section: T = yaml_load_typed(schema=schema, data=text, defaults=start)  # type: ignore[no-untyped-call]
+        return section
+
+    try:
+        section = read(data or {})
         _check(section)
         return section
-    except (*_SCHEMA_ERRORS, ScenarioError) as error:
-        raise ScenarioError(f"{source}: {' '.join(str(error).split())}") from None
+    except ScenarioError as error:
+        raise ScenarioError(f"{source}: {error}") from None
+    except _SCHEMA_ERRORS as error:
+        *path, value = _culprit(data, read)
+        is_shape = isinstance(error, AssertionError)  # Its message is the value once more.
+        reason = "it must be a mapping" if is_shape else " ".join(str(error).split())
+        where = ": ".join([source, *path])
+        raise ScenarioError(f"{where} cannot be {quoted(value)} ({reason})") from None
+
+
+def _culprit(values: Any, read: Callable[[dict[str, Any]], object]) -> list[Any]:
+    """Returns the keys that lead to the first value that cannot be read, and the value."""
+    for key, value in values.items() if isinstance(values, dict) else ():
+        try:
+            read({key: value})
+        except _SCHEMA_ERRORS:
+
+            def read_below(part: dict[str, Any], key: str = key) -> object:
+                return read({key: part})
+
+            return [str(key), *_culprit(value, read_below)]
+    return [values]
 
 
 def _check(section: Any) -> None:

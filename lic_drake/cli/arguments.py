@@ -177,12 +177,12 @@ def category_of(robot: str) -> str:
     return CATEGORIES[0 if get_robot(robot).is_planar else 3]
 
 
-def overrides_of(args: argparse.Namespace, category: str) -> str:
+def overrides_of(given: str, category: str) -> str:
     """Returns the YAML text of --set; before spheres, where it is empty, some apertures are closed.
 
     With all of them open the best start is too often the one that is straight before the goal.
     """
-    return args.set or ("{clutter: {num_blocked: 8}}" if category == CATEGORIES[3] else "")
+    return given or ("{clutter: {num_blocked: 8}}" if category == CATEGORIES[3] else "")
 
 
 def with_robot(overrides: str, robot: str) -> str:

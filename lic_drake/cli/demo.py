@@ -62,13 +62,14 @@ def add_parser(subparsers: Subparsers) -> None:
         "gallery",
         run_gallery,
         "show selected reaches on one static page",
-        "Writes index.html, which works offline: recordings, stills and numbers of successful and"
-        " failed reaches of each category, in environments that are in no library.",
+        "Writes index.html, which works offline: recordings, stills, estimates and numbers of"
+        " successful and failed reaches, in environments that are in no library, of each shipped"
+        " library or of one.",
         "lic gallery out/gallery --each 2",
         ["--method", "--library", "--seed", "--json"],
     )
     gallery.add_argument("out", metavar="OUT", type=Path, help="folder to write to")
-    add_count(gallery, "--each", 1, "number of successes, and of failures, per category")
+    add_count(gallery, "--each", 1, "number of successes, and of failures, per library")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -86,7 +87,8 @@ def run(args: argparse.Namespace) -> int:
     foliage, meshes = category == _FOLIAGE, args.visuals == "drake_models"
     # Libraries of a robot other than the category's own have its name, too.
     robot = "" if load_scenario(category).robot == args.robot else args.robot
-    overrides = overrides_of(args, category)
+    load_scenario(category, with_robot("", robot))  # Refuses an arm of the plane in space.
+    overrides = overrides_of(args.set, category)
     # In foliage, experience comes from spheres: the demonstration is about transfer (paper V-B).
     learned = _SPHERES if foliage else category
     path = args.library or shipped_library(learned, robot)
@@ -99,6 +101,11 @@ def run(args: argparse.Namespace) -> int:
     scenario = library.scenario()
     if args.robot and get_robot(args.robot).digest != scenario.arm().digest:
         raise LicError(f"{library.path} is for --robot {scenario.robot}, not {args.robot}")
+    if args.category and not foliage and args.category != scenario.category:
+        raise LicError(
+            f"{library.path} is of {scenario.category}, not --category {args.category}; choose"
+            " another --library or omit --category"
+        )
     scenario = parse_scenario(scenario_text(scenario), overrides, source="--set")
     if foliage:
         scenario = load_scenario(category, with_robot(overrides, scenario.robot))
@@ -124,24 +131,30 @@ def run_gallery(args: argparse.Namespace) -> int:
     from lic_drake.experience.schema import write_atomically
     from lic_drake.experience.store import ExperienceLibrary
     from lic_drake.select.registry import check_method
-    from lic_drake.show.gallery import choose_exhibits, make_gallery, numbers_of
+    from lic_drake.show.gallery import STREAM, choose_exhibits, make_gallery, numbers_of
 
     check_method(args.method)
     check_writable(args.out)
+    path = args.out / "index.html"
+    if path.is_dir():
+        raise LicError(f"cannot write {path}: it is a folder; delete it or choose another OUT")
     paths = [args.library] if args.library else shipped_libraries()
     libraries = [ExperienceLibrary(path) for path in paths]
+    overrides = []
     for library in libraries:  # Fails before the first one is learned from.
-        library.scenario()
+        scenario = library.scenario()
+        scenario.sample_goal(STREAM, args.seed)
+        overrides.append(overrides_of("", scenario.category))
     exhibits = [
         exhibit
-        for library in libraries
-        for exhibit in choose_exhibits(library, args.method, args.each, args.seed, say=remark)
+        for library, over in zip(libraries, overrides, strict=True)
+        for exhibit in choose_exhibits(library, args.method, args.each, args.seed, remark, over)
     ]
-    path = args.out / "index.html"
     page = make_gallery(exhibits, args.method)
     write_atomically(path, lambda temporary: temporary.write_text(page, encoding="utf-8"))
     trials = [
         {
+            "robot": exhibit.scenario.arm().name,
             "category": exhibit.scenario.category,
             "environment": exhibit.environment,
             "goal": exhibit.p_WG.tolist(),

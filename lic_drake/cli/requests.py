@@ -75,7 +75,7 @@ def _start_in_aperture(scenario: Scenario, p_WG: Vector, args: argparse.Namespac
     return Start(found.x0, b0)
 
 
-def read_failure(starts: FeasibleStarts, text: str) -> FailedReach:
+def read_failure(scenario: Scenario, starts: FeasibleStarts, text: str) -> FailedReach:
     """Reads a failed attempt from YAML or JSON, given in place or as a file."""
     if not text.lstrip().startswith("{"):
         try:
@@ -83,9 +83,25 @@ def read_failure(starts: FeasibleStarts, text: str) -> FailedReach:
         except (OSError, ValueError) as error:
             raise RequestError(f"--failed: cannot read {text!r}: {error}") from None
     values = read_mapping(text, "--failed")
-    for name in values.keys() - ReachRecord.__dataclass_fields__.keys():
-        raise RequestError(f"--failed: {name!r} is not a column of a record, such as start_y")
-    shown = {name: float(x) for name, x in values.items() if isinstance(x, int | float)}
+    shown = {}
+    for name, value in values.items():
+        column = ReachRecord.__dataclass_fields__.get(name)
+        if column is None:
+            raise RequestError(f"--failed: {name!r} is not a column of a record, such as start_y")
+        if column.type not in (int, float) or value is None:  # What was never measured is null.
+            continue
+        limit = np.pi if name in ("start_phi", "final_phi") else 1e6
+        if type(value) not in (int, float) or not abs(value) <= limit:
+            raise RequestError(
+                f"--failed: {name} must be a number from {-limit:.5g} to {limit:.5g}, in metres,"
+                f" radians or m/s, got {value!r}"
+            )
+        shown[name] = float(value)
+    if values.get("category", scenario.category) != scenario.category:
+        raise RequestError(
+            f"--failed is a reach of {values['category']}, but the library is of"
+            f" {scenario.category}; choose another --library"
+        )
     axes = ("base_x", "base_y", "torso")
     varied = np.ptp(starts.grid.b0, axis=0) > 0.0
     needed = ["start_y", "start_z" if isinstance(starts, BoardStarts) else "start_phi"]

@@ -106,7 +106,7 @@ def run_train(args: argparse.Namespace) -> int:
         rows = train(
             args.out,
             category,
-            with_robot(overrides_of(args, category), args.robot),
+            with_robot(overrides_of(args.set, category), args.robot),
             minutes=args.minutes,
             reaches=args.reaches,
             workers=workers,

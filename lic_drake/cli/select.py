@@ -54,11 +54,12 @@ def run(args: argparse.Namespace) -> int:
     import numpy as np
 
     from lic_drake.cli.requests import read_failure, read_goal, require
+    from lic_drake.estimate.features import features_of
+    from lic_drake.estimate.registry import estimator_names
     from lic_drake.evaluate.reliability import FEWEST, read_reliability
     from lic_drake.experience.pairs import FIRST_PREFIX
     from lic_drake.experience.store import ExperienceLibrary
     from lic_drake.reach.request import check_goal
-    from lic_drake.select.lic import LicSelector
     from lic_drake.select.registry import make_selector, needs_library
     from lic_drake.select.situation import Situation
     from lic_drake.starts import make_starts
@@ -72,14 +73,14 @@ def run(args: argparse.Namespace) -> int:
     starts = make_starts(scenario, scenario.sample_instance("evaluation", args.seed))
     bases = np.unique(starts.grid.b0, axis=0)
     check_goal(scenario, p_WG - bases[np.argmin(np.linalg.norm((bases - p_WG)[:, 1:], axis=1))])
-    failed = tuple(read_failure(starts, text) for text in args.failed)
+    failed = tuple(read_failure(scenario, starts, text) for text in args.failed)
     rng = np.random.default_rng(args.seed)
     columns, category = library.columns(), scenario.category
-    selector = make_selector(args.method, scenario.arm(), columns, rng, category, say=remark)
-    if isinstance(selector, LicSelector) and selector.second is not None:
-        needed = [name.removeprefix(FIRST_PREFIX) for name in selector.second.features.observed]
+    second = features_of(category).second
+    if second is not None and args.method in estimator_names():  # It has a LIC-2.
+        needed = [name.removeprefix(FIRST_PREFIX) for name in second.observed]
         for reach in failed:
-            hint = f"; or use --method {selector.method}1, which only avoids where it began"
+            hint = f"; or use --method {args.method}1, which only avoids where it began"
             require(reach.shown, needed, hint)
     attempt = len(failed) + 1
     reliability = read_reliability(library.path, args.method, attempt)
@@ -88,6 +89,7 @@ def run(args: argparse.Namespace) -> int:
             f"{library.path} has no {FEWEST} choices of {args.method} for attempt {attempt}, so"
             " no probability is known; make some as `lic select --help` says, or omit --least"
         )
+    selector = make_selector(args.method, scenario.arm(), columns, rng, category, say=remark)
     chosen = selector.select(Situation(p_WG=p_WG, starts=starts, failed=failed))
     assert chosen.start.q is not None
     values = {

@@ -14,6 +14,7 @@ from uuid import uuid4
 
 import numpy as np
 
+from lic_drake.errors import LibraryError, RequestError
 from lic_drake.evaluate.trials import TrialRow, read_trials, write_trials
 from lic_drake.experience.runner import Task, refuse_failed, run_tasks, shard_name
 from lic_drake.experience.store import ExperienceLibrary
@@ -35,6 +36,9 @@ from lic_drake.select.registry import (
 from lic_drake.select.situation import FailedReach, Selection, Situation
 from lic_drake.starts import FeasibleStarts, make_starts
 from lic_drake.types import Vector
+
+MOST = 1_000_000
+"""Largest number of environments."""
 
 SAY_S = 5.0
 """Time between two progress messages, seconds."""
@@ -174,8 +178,7 @@ def run_evaluation(
         LicError: A method is unknown, a library cannot be read or written, or an environment
             failed; reaches of finished environments are kept.
     """
-    for method in evaluation.methods:
-        check_method(method)
+    _check(evaluation)
     scenario = evaluation.scenario()
     library = evaluation.reaches
     library.create()
@@ -204,6 +207,7 @@ def run_evaluation(
             say(f"  {done}{of} environments, {len(rows)} attempts{left}; kept in {library.path}")
 
     with library.locked():
+        others = read_trials(evaluation.trials_path) if evaluation.trials_path.exists() else []
         known: defaultdict[int, list[ReachRecord]] = defaultdict(list)
         for record in library.records() if library.shard_paths() else []:
             known[record.environment].append(record)
@@ -215,11 +219,34 @@ def run_evaluation(
         refuse_failed(run_tasks(tasks, _try_environment, workers or Workers(), finish))
         library.compact()
     rows.sort(key=lambda row: (row.method, row.environment, row.goal, row.attempt))
-    others = read_trials(evaluation.trials_path) if evaluation.trials_path.exists() else []
     replaced = {(evaluation.variant, method) for method in evaluation.methods}
     kept = [row for row in others if (row.variant, row.method) not in replaced]
     write_trials(evaluation.trials_path, [*kept, *rows])
     return rows
+
+
+def _check(evaluation: Evaluation) -> None:
+    """Raises a LicError for an evaluation that cannot be."""
+    methods, results = evaluation.methods, ExperienceLibrary(evaluation.results)
+    for method in methods:
+        check_method(method)
+        if methods.count(method) > 1:
+            raise RequestError(f"method {method} is there {methods.count(method)} times; keep one")
+    if not 1 <= evaluation.environments <= MOST:
+        raise RequestError(f"environments must be from 1 to {MOST}, got {evaluation.environments}")
+    held = results.shard_paths() if results.path.is_dir() else []
+    if set(held) - {evaluation.trials_path}:
+        raise LibraryError(
+            f"{results.path} is a library itself; evaluate into another folder, such as"
+            f" {results.path / 'choices'}"
+        )
+    if any(map(needs_library, methods)):
+        learned = ExperienceLibrary(evaluation.experience).scenario()
+        if learned.arm().digest != evaluation.scenario().arm().digest:
+            raise LibraryError(
+                f"{evaluation.experience} is for {learned.arm().name}, but"
+                f" {evaluation.scenario().arm().name} is evaluated; choose another library"
+            )
 
 
 class _Strategies:

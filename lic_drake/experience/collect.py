@@ -169,7 +169,7 @@ def read_request(path: Path) -> CollectionRequest:
         digest, scenario = data.pop("scenario_digest"), yaml.safe_dump(data.pop("scenario"))
         same = parse_same_scenario(scenario, digest, path)
         return CollectionRequest(scenario=same, **data)
-    except (KeyError, TypeError) as error:
+    except (KeyError, TypeError, RequestError) as error:
         raise LibraryError(
             f"{path} is not a collection request ({error}); restore it, or delete it and run lic"
             " collect with the library's options"

@@ -55,11 +55,12 @@ class ExperienceLibrary:
     def _read(self, columns: list[str] | None) -> tuple[dict[str, str], list[pa.Table]]:
         """Reads all shards, which must agree on the scenario; returns the header of the first."""
         paths = self.shard_paths()
-        if not paths:
+        shards = [read_shard(path, columns) for path in paths]
+        if not any(len(table) for _, table in shards):
             raise LibraryError(
                 f"{self.path} holds no reaches yet; add some with: lic collect {self.path}"
             )
-        headers, tables = zip(*(read_shard(path, columns) for path in paths), strict=True)
+        headers, tables = zip(*shards, strict=True)
         first = headers[0]["scenario_digest"]
         for path, header in zip(paths, headers, strict=True):
             if (digest := header["scenario_digest"]) != first:

@@ -32,6 +32,8 @@ _LATER_FIELDS = frozenset(
 )
 """Fields that digests leave out at their defaults: the first libraries are older than they are."""
 
+_PLACES = {False: "in the plane", True: "in space"}
+
 
 @dataclass(kw_only=True)
 class Scenario:
@@ -122,9 +124,13 @@ def parse_scenario(content: str | bytes, overrides: str = "", source: str = "sce
     for key in ("category", "robot"):
         if not isinstance(data.get(key), str):
             raise ScenarioError(f"{source}: {key} must be a name, got {data.get(key)!r}")
-    sampler = get_category(data["category"]).sampler
-    robot = robot_path(data["robot"], source)
+    category, robot = get_category(data["category"]), robot_path(data["robot"], source)
     arm, preset = get_robot(robot), "haptic_mpc_2013"
+    if category.in_space == arm.is_planar:
+        raise ScenarioError(
+            f"{source}: {data['category']} is clutter {_PLACES[category.in_space]}, but {arm.name}"
+            f" is an arm {_PLACES[not arm.is_planar]}; choose another category or robot"
+        )
     mpc: Any = data.get("mpc")
     if mpc is None or isinstance(mpc, dict):
         mpc = arm.mpc | (mpc or {})
@@ -134,7 +140,7 @@ def parse_scenario(content: str | bytes, overrides: str = "", source: str = "sce
     scenario = Scenario(
         category=data["category"],
         robot=robot,
-        clutter=read_section(sampler, data.get("clutter"), f"{source}: clutter"),
+        clutter=read_section(category.sampler, data.get("clutter"), f"{source}: clutter"),
         task=read_section(Task, data.get("task"), f"{source}: task"),
         scene=read_section(SceneConfig, data.get("scene"), f"{source}: scene"),
         mpc=read_section(MpcConfig, mpc, f"{source}: mpc", defaults=PRESETS[preset]()),

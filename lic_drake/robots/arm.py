@@ -104,7 +104,8 @@ class Arm:
         plant.RegisterAsSourceForSceneGraph(scene_graph)
         try:
             self._read(plant, scene_graph, skin_links, (q_min, q_max), home, kinematics)
-        except (OSError, RuntimeError, ValueError) as error:
+        # What Drake demands of a model, such as limits in order, ends as a SystemExit.
+        except (OSError, RuntimeError, ValueError, SystemExit) as error:
             raise ScenarioError(
                 f"the model of {name} does not describe {'a planar' if is_planar else 'an'} arm:"
                 f" {' '.join(str(error).split())}"

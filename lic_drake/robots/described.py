@@ -18,7 +18,13 @@ from pydrake.geometry import Capsule, Cylinder, Sphere
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.multibody.parsing import PackageMap
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
-from pydrake.multibody.tree import FixedOffsetFrame, Joint, ModelInstanceIndex, PdControllerGains
+from pydrake.multibody.tree import (
+    FixedOffsetFrame,
+    Joint,
+    ModelInstanceIndex,
+    PdControllerGains,
+    PrismaticJoint,
+)
 
 from lic_drake.config import check_numbers, read_mapping, read_named, read_section
 from lic_drake.errors import ScenarioError
@@ -92,13 +98,14 @@ class RobotFile:
     ignored_contacts: list[list[str]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        check_numbers(self, intervals=["height_range_m"])
+        check_numbers(self, finite=["height_range_m"], intervals=["height_range_m"])
         if len(self.carriage) not in (0, 3):
             raise ScenarioError(
                 f"carriage must be add, or the joints along x, y and z, got {self.carriage}"
             )
         for capsule in self.capsules:
-            if [len(end) for end in capsule.ends] != [3, 3] or not capsule.radius_m > 0.0:
+            sizes, numbers = list(map(len, capsule.ends)), [*chain(*capsule.ends), capsule.radius_m]
+            if sizes != [3, 3] or not _finite(numbers) or not capsule.radius_m > 0.0:
                 raise ScenarioError(
                     f"capsules: that of {capsule.link!r} needs ends: [[x, y, z], [x, y, z]] and a"
                     f" positive radius_m, got {capsule.ends} and {capsule.radius_m}"
@@ -107,6 +114,9 @@ class RobotFile:
             if len(pair) != 2:
                 raise ScenarioError(f"ignored_contacts must be pairs of links, got {pair}")
         for name, joint in self.joints.items():
+            for key, value in vars(joint).items():
+                if value is not None and not math.isfinite(value):
+                    raise ScenarioError(f"joints: {name}: {key} must be finite, got {value}")
             gains = (joint.stiffness, joint.damping)
             if gains != (None, None) and not all(gain and gain > 0.0 for gain in gains):
                 raise ScenarioError(
@@ -163,6 +173,14 @@ class RobotFile:
                     f" {given.upper_deg} degrees and of the model"
                 )
             joint.set_position_limits(low, high)
+            if given.held is not None and not np.all((low <= given.held) & (given.held <= high)):
+                raise ScenarioError(
+                    f"joints: {name}: held must be within its limits, from {low.min():g} to"
+                    f" {high.max():g}, got {given.held:g}"
+                )
+        for name in self.carriage:
+            if not isinstance(_joint(plant, arm, name, "carriage"), PrismaticJoint):
+                raise ScenarioError(f"carriage: joint {name!r} turns; name one that slides, or add")
         if plant.geometry_source_is_registered():
             self._add_shapes(plant, arm)
 
@@ -247,6 +265,8 @@ def _read(content: bytes, path: Path) -> Arm:
     for key, none in (("skin_links", "all"), ("carriage", "add")):
         if data.get(key) == none:
             data[key] = []
+        elif isinstance(data.get(key), str):  # It would be read letter by letter.
+            raise ScenarioError(f"{source}: {key} must be {none} or a list, got {data[key]!r}")
     robot = read_section(RobotFile, data, source)
     model = _find_model(robot.model, path)
     identity = repr(asdict(robot)).encode() + model.read_bytes()
@@ -298,13 +318,17 @@ def _depth(plant: MultibodyPlant) -> Callable[[Joint], int]:
     return depth
 
 
-def _joint(plant: MultibodyPlant, arm: ModelInstanceIndex, name: str) -> Joint:
+def _joint(plant: MultibodyPlant, arm: ModelInstanceIndex, name: str, key: str = "joints") -> Joint:
     """Returns a joint; a ScenarioError if there is none."""
     if not plant.HasJointNamed(name, arm):
         joints = [plant.get_joint(i) for i in plant.GetJointIndices(arm)]
         moving = [joint.name() for joint in joints if joint.num_positions()]
-        raise ScenarioError(f"joints: {name!r} is not in the model; it has {', '.join(moving)}")
+        raise ScenarioError(f"{key}: {name!r} is not in the model; it has {', '.join(moving)}")
     return plant.GetJointByName(name, arm)
+
+
+def _finite(numbers: Iterable[float]) -> bool:
+    return all(map(math.isfinite, numbers))
 
 
 def _check_links(names: Iterable[str], known: Iterable[str], key: str) -> None:

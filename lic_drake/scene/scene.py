@@ -70,8 +70,9 @@ class SceneConfig:
         names = "cenic_accuracy cenic_max_step_s ground_friction_N ground_creep_m_per_s"
         check_numbers(
             self,
-            positive=[*names.split(), "drag_N_s_per_m", "taxels_per_m", "calm_change_N"],
+            positive=[*names.split(), "drag_N_s_per_m", "calm_change_N"],
             non_negative=["calm_move_m"],
+            ranges={"taxels_per_m": (1.0, 1000.0)},
         )
 
 

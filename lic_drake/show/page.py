@@ -71,10 +71,11 @@ def embed(page: str, title: str = "recording", height_px: int = 480, button: str
     name = "recording-" + hashlib.sha256(packed.encode()).hexdigest()[:12]
     show = (
         f"() => ({UNPACK})('{packed}')"
-        f".then(page => document.getElementById('{name}').srcdoc = page)"
+        f".then(page => Object.assign(document.getElementById('{name}'),"
+        " {srcdoc: page, hidden: false}))"
     )
     frame = (
-        f'<iframe id="{name}" title="{html.escape(title)}"'
+        f'<iframe id="{name}" title="{html.escape(title)}"{" hidden" if button else ""}'
         f' style="width:100%;height:{height_px}px;border:0"></iframe>\n'
     )
     if not button:

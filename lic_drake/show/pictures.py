@@ -1,6 +1,6 @@
 """A demonstration's output: recording, figures, stills, film and page."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -32,10 +32,12 @@ _FIGURES = {
     "apertures": "Estimated probability of success through each aperture, before each attempt.",
     "path": "The way of the arm.",
 }
-_STYLE = (
+
+PICTURES_STYLE = (
     "img { width: auto; max-width: 100%; max-height: 38rem; }"
     " .row { display: flex; gap: 1rem; } .row figure { flex: 1; }"
 )
+"""CSS of pages with `show_pictures`."""
 
 
 def remove_pictures(out: Path) -> None:
@@ -46,19 +48,20 @@ def remove_pictures(out: Path) -> None:
 
 def save_pictures(
     trial: ShownTrial,
-    selector: LicSelector,
+    selector: LicSelector | None,
     known: Observer | BoardStarts | LineStarts,
     out: Path,
     say: Callable[[str], None] = print,
     drake_models: Path | None = None,
+    film: bool = True,
 ) -> dict[str, Path]:
     """Writes demo.html, path.png, film.webp and `lic_drake.show.stills.save_stills`'s stills.
 
     In the plane also density.png, in front of a board apertures.png, and with cameras look1.png and
-    so on. The estimates are the selector's; `known` is
+    so on. The estimates are the selector's, if there is one; `known` is
     what the robot observed, or the feasible starts if it knows them. Returns the files by kind;
     where nothing can be rendered, `say` receives a warning, and there are neither film nor stills.
-    A LicError says which file cannot be written.
+    A film takes longer than all else. A LicError says which file cannot be written.
     """
     attempts = trial.attempts
     recording = record_trial(trial, drake_models)
@@ -70,7 +73,9 @@ def save_pictures(
         save_figure(figure, files[kind])
 
     save("path", "path.png", path_figure(trial))
-    files |= save_rendered(trial, out, say, drake_models)
+    files |= save_rendered(trial, out, say, drake_models, film)
+    if selector is None:
+        return files
     if isinstance(known, Observer):
         save("apertures", "apertures.png", maps_figure(selector, known, attempts))
         for number in range(1, len(attempts) + 1):
@@ -84,7 +89,11 @@ def save_pictures(
 
 
 def save_rendered(
-    trial: ShownTrial, out: Path, say: Callable[[str], None], drake_models: Path | None = None
+    trial: ShownTrial,
+    out: Path,
+    say: Callable[[str], None],
+    drake_models: Path | None = None,
+    film: bool = True,
 ) -> dict[str, Path]:
     """Writes stills and film, see `save_pictures`; returns the files by kind."""
     try:
@@ -93,7 +102,7 @@ def save_rendered(
         say(f"no stills and no film: {error}")
         return {}
     files = save_stills(trial, camera, out)
-    if files:
+    if files and film:
         files["film"] = out / "film.webp"
         save_film(film_frames(trial, drake_models), files["film"])
     return files
@@ -127,26 +136,32 @@ def path_figure(trial: ShownTrial) -> Figure:
 
 def index_page(title: str, attempts: Sequence[Attempt], files: Mapping[str, Path]) -> str:
     """Returns a page that shows and links what was written beside it, by kind (paper Fig. 2)."""
+    shown = show_pictures(attempts, files, lambda kind, words: linked(files[kind].name, words))
+    links = (
+        f'<p><a href="{files["recording"].name}">The recording</a>, to turn and to play, and'
+        f' <a href="{files["data"].name}">all numbers</a>.</p>'
+    )
+    return make_page(title, f"{shown}\n{links}", PICTURES_STYLE)
+
+
+def show_pictures(
+    attempts: Sequence[Attempt], kinds: Collection[str], show: Callable[[str, str], str]
+) -> str:
+    """Returns the pictures of a trial as HTML; `show` makes it of a kind and a plain caption."""
     parts = []
-    if "film" in files:
-        parts.append(linked(files["film"].name, "All attempts. Arrows are contact forces."))
+    if "film" in kinds:
+        parts.append(show("film", "All attempts. Arrows are contact forces."))
     for number, attempt in enumerate(attempts, start=1):
         words = f"Attempt {number}: {attempt.record.outcome}"
         if attempt.selection.probability is not None:
             words += f", estimated success {100.0 * attempt.selection.probability:.0f} %"
-        parts.append(f"<h2>{words}</h2>")
-        if f"look {number}" in files:
+        parts.append(f"<h3>{words}</h3>")
+        if f"look {number}" in kinds:
             words = "What the cameras saw: open apertures, passable probabilities and the goal."
-            parts.append(linked(files[f"look {number}"].name, words))
-        moments = [kind for kind in files if kind.startswith(f"attempt {number} ")]
-        stills = (linked(files[kind].name, kind.split()[-1]) for kind in moments)
+            parts.append(show(f"look {number}", words))
+        moments = [kind for kind in kinds if kind.startswith(f"attempt {number} ")]
+        stills = (show(kind, kind.split()[-1]) for kind in moments)
         parts.append(f'<div class="row">{"".join(stills)}</div>')
-    parts.append("<h2>What was believed, and the way</h2>")
-    for kind, words in _FIGURES.items():
-        if kind in files:
-            parts.append(linked(files[kind].name, words))
-    parts.append(
-        f'<p><a href="{files["recording"].name}">The recording</a>, to turn and to play, and'
-        f' <a href="{files["data"].name}">all numbers</a>.</p>'
-    )
-    return make_page(title, "\n".join(parts), _STYLE)
+    parts.append("<h3>What was believed, and the way</h3>")
+    parts += [show(kind, words) for kind, words in _FIGURES.items() if kind in kinds]
+    return "\n".join(parts)

@@ -98,7 +98,10 @@ def test_what_a_machine_may_read_comes_as_json() -> None:
 
 WRONG = [
     ("demo --method jungle", "'jungle'; choose one of rnd"),
-    ("demo --robot planar-arm --category sphere-aperture-clutter", "no experience of planar-arm"),
+    (
+        "demo --robot planar-arm --category sphere-aperture-clutter",
+        "is an arm in the plane; choose",
+    ),
     ("demo --robot iiwa14 --library cylinder-clutter", "is for --robot planar-arm, not iiwa14"),
     ("demo --robot jungle", "choose one of planar-arm, pr2"),
     ("train {none} --robot jungle --minutes 1", "choose one of planar-arm, pr2"),

@@ -1,0 +1,1 @@
+"""The pictures of demonstrations in the READMEs."""
