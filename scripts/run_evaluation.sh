@@ -72,6 +72,8 @@ evaluate_pr2() {
         --set '{clutter: {num_blocked: 10}}' "$@"
 }
 evaluate_pr2
+# Further attempts in imagined environments, which takes most of a minute each.
+evaluate sphere-aperture-clutter 300 1 --methods imagine --set '{clutter: {num_blocked: 10}}'
 evaluate_pr2 --still --variant still
 python scripts/bounds/run.py sphere-aperture-clutter --environments 100 --still \
     --set '{clutter: {num_blocked: 10}}'

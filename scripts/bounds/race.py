@@ -27,7 +27,7 @@ STREAM = "evaluation"
 APART_M = 0.15
 """Least distance of two starts, in the space of base, torso height and aperture, metres."""
 
-ROUND, ROUNDS = 10, 6
+ROUND, ROUNDS = 10, 3
 """Starts at each goal in a round, and the largest number of rounds."""
 
 
