@@ -59,8 +59,9 @@ def pr2_table(trials: TrialTable, reachable: BoolVector) -> Table:
     """
     rows: list[tuple[str, ...] | None] = []
     for variant, stand in (("", "move along the board"), ("still", "stay")):
-        methods = [m for m in (*METHODS, IMAGINE) if m in trials.methods(variant)]
-        rows += success_rows(trials, stand, [(label(m), m, variant) for m in methods])
+        names = {m: label(m) for m in METHODS} | {IMAGINE: "LIC(GP), then imagine"}
+        tried = [(name, m, variant) for m, name in names.items() if m in trials.methods(variant)]
+        rows += success_rows(trials, stand, tried)
         if not variant:
             rows.append((stand, "", CEILING, *rate_cells(count(reachable)), "", ""))
     return Table(
