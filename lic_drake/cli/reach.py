@@ -74,7 +74,8 @@ def run(args: argparse.Namespace) -> int:
         from lic_drake.show.recording import Recording
 
         recording = Recording(scenario, instance_of(request))
-        recording.add_reach(simulate_request(request, keep_states=True).trace, request.goal)
+        trace = simulate_request(request, keep_states=True).trace
+        recording.add_reach(trace, request.goal, record.outcome)
         recording.save(args.record)
     values = dataclasses.asdict(record)
     # JSON has no NaN for values that were never measured.

@@ -114,23 +114,27 @@ def record_trial(trial: ShownTrial, drake_models: Path | None = None) -> Recordi
     approach = not scenario.arm().is_planar
     recording = Recording(scenario, instance, drake_models, approach)
     before: ReachTrace | None = None
-    for trace in trial.traces:
+    for caption, trace in labelled(trial):
         if approach and trace.q:
             if before is not None:
                 recording.retract(before)
             recording.move_to(trace.b0, trace.q[0])
             before = trace
-        recording.add_reach(trace, trial.p_WG)
+        recording.add_reach(trace, trial.p_WG, caption)
     return recording
+
+
+def labelled(trial: ShownTrial) -> list[tuple[str, ReachTrace]]:
+    """Returns the traces of all attempts, each with its number and outcome in words."""
+    return [(f"attempt {i}: {a.record.outcome}", t) for i, (a, t) in enumerate(trial, start=1)]
 
 
 def path_figure(trial: ShownTrial) -> Figure:
     """Returns views of all attempts from above and, in space, from the side."""
     views = (TOP,) if trial.scenario.arm().is_planar else (TOP, SIDE)
     figure = Figure(figsize=(7 * len(views), 7), layout="constrained")
-    labelled = [(f"attempt {i}: {a.record.outcome}", t) for i, (a, t) in enumerate(trial, start=1)]
     for ax, axes in zip(figure.subplots(1, len(views), squeeze=False)[0], views, strict=True):
-        draw_view(ax, trial.scenario, trial.instance, trial.p_WG, labelled, axes)
+        draw_view(ax, trial.scenario, trial.instance, trial.p_WG, labelled(trial), axes)
     return figure
 
 

@@ -1,5 +1,6 @@
 """Records reaches as one HTML file that plays offline, contact forces included."""
 
+import html
 import math
 from pathlib import Path
 
@@ -32,6 +33,11 @@ ARM_RAD_PER_S = 1.2
 RETRACT_SPEED = 4.0
 """Playback speed of the arm's retraction, relative to the reach."""
 
+_CAPTIONS = (
+    '<p style="position: fixed; left: 1rem; bottom: 0; font: 16px/1.5 system-ui, sans-serif;'
+    ' color: #222; pointer-events: none">'
+)
+
 
 class Recording:
     """A Meshcat scene of one environment in which reaches are recorded one after another.
@@ -63,6 +69,7 @@ class Recording:
         self._frames_per_second = frame_rate(scenario.mpc.rate_hz)
         self._springs_back = instance.stems is not None
         self._clock_s = 0.0
+        self._captions: list[str] = []
         self._b0 = scenario.task.b0
         self._q = self._screen.initial if self._approach is None else self._approach.waiting
         self._meshcat.StartRecording(
@@ -71,8 +78,13 @@ class Recording:
         if approach:
             self._draw()
 
-    def add_reach(self, trace: ReachTrace, p_WG: Vector) -> None:
-        """Records a reach to a goal p_WG; the trace needs its states."""
+    def add_reach(self, trace: ReachTrace, p_WG: Vector, caption: str = "") -> None:
+        """Records a reach to a goal p_WG; the trace needs its states.
+
+        The page shows plain-text captions below each other, with the time at which each begins.
+        """
+        if caption:
+            self._captions.append(f"from {self._clock_s:.0f} s: {caption}")
         self._screen.draw_goal(p_WG)
         self._screen.show_forces(True, self._clock_s)
         self._b0 = trace.b0
@@ -115,7 +127,8 @@ class Recording:
         """Returns the recording as a page."""
         self._meshcat.StopRecording()
         self._meshcat.PublishRecording()
-        return str(self._meshcat.StaticHtml())
+        lines = "<br>".join(map(html.escape, self._captions))
+        return str(self._meshcat.StaticHtml()).replace("</body>", f"{_CAPTIONS}{lines}</p></body>")
 
     def _sample_step(self) -> int:
         """Returns the number of samples of a reach per frame."""

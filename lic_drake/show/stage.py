@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 from pydrake.geometry import (
+    Box,
     Cylinder,
     Meshcat,
     MeshcatParams,
@@ -29,9 +30,22 @@ from lic_drake.types import Vector
 NEUTRAL = Rgba(0.0, 0.7, 0.8, 0.9)
 """Colour of a goal."""
 
+
+FLOOR_THICKNESS_M = 0.02
+
+# Meshcat's light fades further away.
+_FLOOR, _FLOOR_COLOR = Box(4.0, 4.0, FLOOR_THICKNESS_M), Rgba(0.86, 0.86, 0.88, 1.0)
 _SCENE, _FORCES = "/drake", "/drake/contact_forces"
 _PLANE_VIEW = (np.array([-0.4, -0.3, 1.05]), np.array([0.45, 0.02, 0.0]))
 _SPACE_VIEW = (np.array([-0.45, -1.65, 1.65]), np.array([0.4, -0.15, 0.85]))
+
+
+def floor_centre(in_plane: bool) -> Vector:
+    """Returns the centre of the floor in W, shape (3,), metres.
+
+    Cylinders of the plane stand with their middle at z = 0.
+    """
+    return np.array([0.0, 0.0, (-0.13 if in_plane else 0.0) - 0.5 * FLOOR_THICKNESS_M])
 
 
 def add_stage(
@@ -140,6 +154,8 @@ def open_meshcat(in_plane: bool, port: int | None = None) -> Meshcat:
         logger.setLevel(level)
     for end in ("top_color", "bottom_color"):
         meshcat.SetProperty("/Background/<object>", end, [0.97, 0.97, 0.98])
+    meshcat.SetObject("/floor", _FLOOR, _FLOOR_COLOR)
+    meshcat.SetTransform("/floor", RigidTransform(floor_centre(in_plane)))
     for hidden in ("/Grid", "/Axes"):
         meshcat.SetProperty(hidden, "visible", False)
     look(meshcat, in_plane)

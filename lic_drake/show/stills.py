@@ -26,7 +26,7 @@ from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.trace import SceneState
 from lic_drake.show.detections import draw_image
 from lic_drake.show.figures import ShownTrial, save_figure
-from lic_drake.show.stage import add_stage, place
+from lic_drake.show.stage import FLOOR_THICKNESS_M, add_stage, floor_centre, place
 from lic_drake.types import Vector
 
 CAMERA = CameraConfig(width=1280, height=960, focal_px=1100.0)
@@ -45,9 +45,6 @@ LONGEST_ARROW_M = 0.3
 
 LEAST_FORCE_N = 0.05
 """Minimum force that is drawn."""
-
-# Cylinders of the plane stand with their middle at z = 0.
-_FLOOR_IN_PLANE_M = -0.13
 
 
 type View = tuple[tuple[float, float, float], tuple[float, float, float]]
@@ -96,9 +93,8 @@ class StillCamera:
         except RuntimeError as error:  # It loads the meshes now.
             raise RenderingError(f"a mesh cannot be rendered: {error}") from None
         planar = scenario.arm().is_planar
-        floor_m = _FLOOR_IN_PLANE_M if planar else 0.0
-        p_WF = np.array([0.0, 0.0, floor_m - 0.01])
-        add_prop(scene_graph, "floor", Box(12.0, 12.0, 0.02), p_WF, FLOOR_COLOR)
+        floor = Box(12.0, 12.0, FLOOR_THICKNESS_M)
+        add_prop(scene_graph, "floor", floor, floor_centre(planar), FLOOR_COLOR)
         radius = scenario.stop.success_distance_m
         add_prop(scene_graph, "goal", Sphere(radius), p_WG, GOAL_COLOR)
         self.views = PLANAR_VIEWS if planar else SPATIAL_VIEWS

@@ -52,7 +52,7 @@ def recorded() -> tuple[list[ReachTrace], str]:
         environment = Environment(scenario, clutter, b0=base)
         result = environment.reach(P_WG + base, EASY_START + base, keep_states=True)
         assert (result.outcome, result.detail) == ("timeout", "")
-        recording.add_reach(result.trace, P_WG + base)
+        recording.add_reach(result.trace, P_WG + base, f"attempt <{len(traces)}>")
         traces.append(result.trace)
     return traces, recording.html()
 
@@ -80,7 +80,10 @@ def test_it_shows_every_object_and_plays_offline(recorded: tuple[list[ReachTrace
     paths = {path.decode() for m in objects for path in re.findall(rb"/[a-z][\w/]+", m)}
     assert any(path.startswith("/drake/visualizer/clutter/object0") for path in paths)
     assert any(path.endswith("surroundings/object1_visual") for path in paths)
-    assert "/task/goal" in paths
+    assert {"/task/goal", "/floor"} <= paths
+    # A second of pause after 0.4 s, and every reach begins at a whole one.
+    for words in ("from 0 s: attempt &lt;0&gt;", "from 2 s: attempt &lt;1&gt;"):
+        assert html.count(words) == 1
     assert not re.search(r"<(script|link|img|iframe)[^>]*(src|href)\s*=", html)
     assert not re.search(r"@import|\bimport\s*\(?\s*['\"]http", html)
 
