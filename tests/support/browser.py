@@ -18,6 +18,9 @@ import numpy as np
 from matplotlib.colors import rgb_to_hsv
 from matplotlib.image import imread
 
+LEAST_GOAL = 5e-5
+"""Share of a picture's points that a goal has at the least."""
+
 
 def visit(
     chromium: str, address: str, tmp_path: Path, size: tuple[int, int] = (1200, 800)
@@ -67,8 +70,8 @@ def move_slider(
     """Opens a live Meshcat and moves a slider in its controls, by the DevTools protocol.
 
     Returns:
-        The pictures before and after it, shape (height, width, 3): the first that shows a scene,
-        and the first that differs from it, or the last ones if `patience_s` seconds pass.
+        The pictures before and after it, shape (height, width, 3): the first that shows clutter
+        and goal, and the first that differs from it, or the last ones if `patience_s` seconds pass.
     """
     from tornado.websocket import websocket_connect
 
@@ -92,12 +95,18 @@ def move_slider(
                 if is_awaited(image) or time.monotonic() > ends:
                     return image
 
-        # Objects arrive one after the other.
-        before = await look(lambda image: hue_share(image, 0, 50) > 2e-3)
+        def is_complete(image: np.ndarray) -> bool:
+            """Returns whether clutter and goal are there: objects arrive one after the other."""
+            return hue_share(image, 0, 50) > 2e-3 and hue_share(image, 175, 200) > LEAST_GOAL
+
+        def has_changed(image: np.ndarray) -> bool:
+            return is_complete(image) and bool(np.any(_left(image) != _left(before)))
+
+        before = await look(is_complete)
         script = f"{_MOVE}({json.dumps([name, str(value)])})"
         moved = await call("Runtime.evaluate", expression=script)
         assert moved["result"]["value"], f"no slider {name!r}"
-        return before, await look(lambda image: bool(np.any(_left(image) != _left(before))))
+        return before, await look(has_changed)
 
     profile = tmp_path / "profile"
     command = [
@@ -127,7 +136,7 @@ def hue_share(image: np.ndarray, low: float, high: float) -> float:
     return float(np.mean((360.0 * hue > low) & (360.0 * hue < high) & (saturation > 0.3)))
 
 
-def assert_shows_a_scene(image: np.ndarray, least_goal: float = 5e-5) -> None:
+def assert_shows_a_scene(image: np.ndarray, least_goal: float = LEAST_GOAL) -> None:
     """Sees that a picture shows clutter and an arm, not an empty scene.
 
     Args:
