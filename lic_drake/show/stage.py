@@ -32,6 +32,7 @@ NEUTRAL = Rgba(0.0, 0.7, 0.8, 0.9)
 
 
 FLOOR_THICKNESS_M = 0.02
+"""Its upper face is the floor, metres."""
 
 # Meshcat's light fades further away.
 _FLOOR, _FLOOR_COLOR = Box(4.0, 4.0, FLOOR_THICKNESS_M), Rgba(0.86, 0.86, 0.88, 1.0)
