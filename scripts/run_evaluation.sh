@@ -77,6 +77,7 @@ evaluate sphere-aperture-clutter 300 1 --methods imagine --set '{clutter: {num_b
 evaluate_pr2 --still --variant still
 python scripts/bounds/run.py sphere-aperture-clutter --environments 100 --still \
     --set '{clutter: {num_blocked: 10}}'
+python scripts/bounds/race.py sphere-aperture-clutter --environments 300
 # Other arms, on pedestals that move.
 for arm in iiwa14 panda; do
     evaluate $arm-sphere-aperture-clutter 150 1 --methods rnd cost gp
@@ -93,3 +94,4 @@ evaluate_foliage sphere-aperture-clutter cameras --cameras foliage --methods rnd
 evaluate_foliage sphere-aperture-clutter known --methods rnd cost gp
 evaluate_foliage foliage-aperture-clutter cameras-foliage --cameras foliage --methods gp
 evaluate_foliage foliage-aperture-clutter known-foliage --methods gp
+python scripts/bounds/race.py foliage-aperture-clutter --environments 100

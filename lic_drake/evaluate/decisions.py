@@ -11,7 +11,7 @@ from lic_drake.estimate.rollouts import Rollouts
 from lic_drake.estimate.rows import feature_scale, selection_folds
 from lic_drake.evaluate.reliability import FEWEST, Reliability
 from lic_drake.seeds import make_generator
-from lic_drake.select.registry import fit_rows
+from lic_drake.select.registry import fit_rows, silent
 from lic_drake.types import BoolVector, IntVector, Vector
 
 _FEWEST_LIKE = 5
@@ -107,12 +107,8 @@ class DecisionModel:
         )
 
 
-def _silent(line: str) -> None:
-    """Says nothing."""
-
-
 def fit_rollouts(
-    rollouts: Rollouts, method: str = "gp", say: Callable[[str], None] = _silent
+    rollouts: Rollouts, method: str = "gp", say: Callable[[str], None] = silent
 ) -> DecisionModel:
     """Learns from anybody's attempts what to decide; see `DecisionModel.choose`.
 

@@ -28,7 +28,7 @@ type Columns = Mapping[str, NDArray[Any]]
 """Columns of a library by name."""
 
 
-def _silent(line: str) -> None:
+def silent(line: str) -> None:
     """Says nothing."""
 
 
@@ -89,7 +89,7 @@ def make_selector(
     columns: Columns | None = None,
     rng: np.random.Generator | None = None,
     category: str = "cylinder-clutter",
-    say: Callable[[str], None] = _silent,
+    say: Callable[[str], None] = silent,
 ) -> Selector:
     """Returns a strategy, fitted to a library if it learns from one; see `fit_model`.
 
@@ -133,7 +133,7 @@ def fit_model(
     features: FeatureMap,
     columns: Columns,
     category: str = "any category",
-    say: Callable[[str], None] = _silent,
+    say: Callable[[str], None] = silent,
 ) -> SuccessModel:
     """Returns an estimator fitted to a library D1, or to pairs D2 where features observe a reach.
 
@@ -149,7 +149,7 @@ def fit_rows(
     rows: ExperienceRows,
     what: str,
     features: FeatureMap = PLANAR_LIC1,
-    say: Callable[[str], None] = _silent,
+    say: Callable[[str], None] = silent,
 ) -> "SuccessEstimator":
     """Returns an estimator fitted to rows; `what` says in a line what they are.
 
