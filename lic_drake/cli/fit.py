@@ -34,7 +34,13 @@ def add_parser(subparsers: Subparsers) -> None:
         " --at object_x=0.4 object_y=0.6 --map map.png",
         ["--json"],
     )
-    parser.add_argument("file", metavar="FILE", type=Path, help=".csv or .parquet file of attempts")
+    parser.add_argument(
+        "file",
+        metavar="FILE",
+        type=Path,
+        help=".csv or .parquet file of attempts, folder of a LeRobot data set or .hdf5 file of a"
+        " robomimic one, of which what was seen first is a column for each number",
+    )
     for name, what in (
         ("--decide", "columns with what was decided"),
         ("--given", "columns with what was known before, such as where the object is"),

@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.types as kinds
 
 from lic_drake.errors import EstimateError, RequestError, quoted
+from lic_drake.estimate.episodes import is_data_set, read_episodes
 from lic_drake.estimate.features import ExperienceRows
 from lic_drake.experience.add import read_table
 from lic_drake.types import IntVector, Vector
@@ -79,7 +80,8 @@ def read_rollouts(
     """Reads attempts, one a row, from a CSV or Parquet file or from a table of pyarrow.
 
     Args:
-        table: Path or table; its other columns are ignored.
+        table: Path or table; its other columns are ignored. A data set of LeRobot or robomimic is
+            read as `lic_drake.estimate.episodes.read_episodes` says.
         decide: Columns with what was decided, numbers of any unit, taken as they are.
         given: Columns with what was known when it was decided, such as where the object is.
         success: Column with 0 or 1, or false or true.
@@ -89,7 +91,8 @@ def read_rollouts(
         LicError: The file, a column or a value is unusable; the message says what to do.
     """
     if not isinstance(table, pa.Table):
-        table = read_table(Path(table))
+        path = Path(table)
+        table = read_episodes(path) if is_data_set(path) else read_table(path)
     names = [*given, *decide, success]
     if twice := {name for name in names if names.count(name) > 1}:
         raise EstimateError(
