@@ -82,7 +82,9 @@ def train(
     while not (held := len(library.successes())) or not is_spent(LEARNING):
         tried = 1 + int(library.columns()["environment"].max()) if held else 0
         method, environments = "gp" if held else "cost", max(LEAST, tried // GROWTH)
-        say(f"{held} reaches; up to {environments} environments with {method}")
+        of = "" if reaches is None else f" of {math.ceil(LEARNING * reaches)}"
+        won = sum(library.successes().values())
+        say(f"{held}{of} reaches, {won} reached; up to {environments} environments with {method}")
         run(
             "learning",
             lambda: is_spent(LEARNING),

@@ -204,7 +204,8 @@ def run_evaluation(
         if now_s >= said_s + SAY_S or done == count:
             said_s, left_s = now_s, (now_s - began_s) * (count - done) / done
             of, left = ("", "") if is_over else (f"/{count}", f", {left_s:.0f} s left")
-            say(f"  {done}{of} environments, {len(rows)} attempts{left}; kept in {library.path}")
+            tried = f"{len(rows)} attempts, {sum(row.success for row in rows)} reached"
+            say(f"  {done}{of} environments, {tried}{left}; kept in {library.path}")
 
     with library.locked():
         others = read_trials(evaluation.trials_path) if evaluation.trials_path.exists() else []
