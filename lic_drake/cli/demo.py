@@ -24,6 +24,7 @@ _SEEDS = {
     "cylinder-clutter": 13,
     "passage-clutter": 24,
     "cylinder-aperture-clutter": 73,
+    "iiwa14-sphere-aperture-clutter": 59,
 }
 """Environments in which the first attempt fails and the second succeeds, else 0."""
 
