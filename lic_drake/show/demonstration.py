@@ -81,11 +81,12 @@ def demonstrate(
     check_writable(out)
     if cameras is not None:
         make_renderer()  # Fails before the library is learned from.
+    say(f"{scenario.category}, evaluation environment {seed}: looking for starts")
     draws = (scenario.sample_goal(STREAM, seed, index) for index in itertools.count())
     p_WG = next(goal for goal in draws if is_reachable(scenario, STREAM, seed, goal))
     say(
-        f"{scenario.category}, evaluation environment {seed}: goal at {_metres(p_WG)} m; learning"
-        f" from {library.num_reaches} reaches of {library.scenario().category}"
+        f"goal at {_metres(p_WG)} m; learning from {library.num_reaches} reaches of"
+        f" {library.scenario().category}"
     )
 
     def select_with(name: str) -> Selector:

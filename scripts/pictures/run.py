@@ -34,6 +34,8 @@ DEMOS = {
         "lic demo --category foliage-aperture-clutter",
         {"foliage.webp": "film.webp"},
     ),
+    "iiwa14": ("lic demo --robot iiwa14", {"iiwa14.png": "attempt2_end.png"}),
+    "panda": ("lic demo --robot panda", {"panda.png": "attempt2_end.png"}),
 }
 """Commands, and for each picture the file of the command's that it is a copy of."""
 
