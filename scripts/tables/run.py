@@ -59,9 +59,7 @@ def pr2_table(trials: TrialTable, reachable: BoolVector) -> Table:
     """
     rows: list[tuple[str, ...] | None] = []
     for variant, stand in (("", "move along the board"), ("still", "stay")):
-        names = {m: label(m) for m in METHODS} | {IMAGINE: "LIC(GP), then imagine"}
-        tried = [(name, m, variant) for m, name in names.items() if m in trials.methods(variant)]
-        rows += success_rows(trials, stand, tried)
+        rows += success_rows(trials, stand, tried_before_spheres(trials, variant))
         if not variant:
             rows.append((stand, "", CEILING, *rate_cells(count(reachable)), "", ""))
     return Table(
@@ -71,6 +69,12 @@ def pr2_table(trials: TrialTable, reachable: BoolVector) -> Table:
         heading=("base and torso", "attempt", "strategy", *SUCCESS_HEADS),
         rows=tuple(rows[1:]),
     )
+
+
+def tried_before_spheres(trials: TrialTable, variant: str = "") -> list[tuple[str, str, str]]:
+    """Returns the strategies of a variant as `success_rows` takes them."""
+    names = {m: label(m) for m in METHODS} | {IMAGINE: "LIC(GP), then imagine"}
+    return [(name, m, variant) for m, name in names.items() if m in trials.methods(variant)]
 
 
 def oracle_table(trials: TrialTable, every: ExperienceLibrary) -> Table:
@@ -98,16 +102,17 @@ def oracle_table(trials: TrialTable, every: ExperienceLibrary) -> Table:
     )
 
 
-def arms_table(trials: Mapping[str, TrialTable]) -> Table:
+def arms_table(trials: Mapping[str, TrialTable], reachable: Mapping[str, BoolVector]) -> Table:
     """Returns the success of several arms before spheres, where bases and heights move.
 
     Args:
         trials: Trials of two attempts by arm.
+        reachable: Where any start is known that reaches the goal, shape (environments,), by arm.
     """
     rows: list[tuple[str, ...] | None] = []
     for arm, table in trials.items():
-        methods = [m for m in METHODS if m in table.methods("")]
-        rows += success_rows(table, arm, [(label(m), m, "") for m in methods])
+        rows += success_rows(table, arm, tried_before_spheres(table))
+        rows.append((arm, "", CEILING, *rate_cells(count(reachable[arm])), "", ""))
     return Table(
         caption="Any arm in sphere-aperture-clutter with 10 of 20 apertures blocked: unseen"
         " environments with a random goal each, the same for all strategies, and for all arms as"
@@ -192,13 +197,13 @@ def paper_tables(results: Path) -> dict[str, list[Table]]:
 def write(results: Path) -> list[Path]:
     """Writes all tables."""
     tables = paper_tables(results)
-    spheres = load_trials(results, "sphere-aperture-clutter")
-    every = ExperienceLibrary(results / "bounds" / "sphere-aperture-clutter" / "random")
-    reachable = reached(results, "sphere-aperture-clutter", len(spheres.pairs()))
-    tables["table_pr2"] = [pr2_table(spheres, reachable), oracle_table(spheres, every)]
     there = {arm: folder for arm, folder in ARMS.items() if (results / folder).exists()}
     arms = {arm: load_trials(results, folder) for arm, folder in there.items()}
-    tables["table_arms"] = [arms_table(arms)]
+    known = {arm: reached(results, there[arm], len(table.pairs())) for arm, table in arms.items()}
+    tables["table_arms"] = [arms_table(arms, known)]
+    every = ExperienceLibrary(results / "bounds" / ARMS["PR2"] / "random")
+    pr2 = pr2_table(arms["PR2"], known["PR2"])
+    tables["table_pr2"] = [pr2, oracle_table(arms["PR2"], every)]
     foliage = load_trials(results, FOLIAGE)
     reachable = reached(results, FOLIAGE, len(foliage.pairs("known")))
     tables["table_foliage"] = [foliage_table(foliage, reachable)]

@@ -82,7 +82,9 @@ def test_strategies_are_tried_at_the_same_goals_of_the_same_environments(
     assert all(records[row.key].start_y > 0.0 for row in firsts if row.method == "knn1")
     assert any(records[row.key].start_y < 0.0 for row in firsts if row.method == "rnd")
     won = sum(row.success for row in rows)
-    assert lines[-1].startswith(f"  3/3 environments, {len(rows)} attempts, {won} reached, 0 s left")
+    assert lines[-1].startswith(
+        f"  3/3 environments, {len(rows)} attempts, {won} reached, 0 s left"
+    )
 
 
 def test_rows_agree_with_the_library_of_reaches(evaluation: Evaluate, calls: list[str]) -> None:

@@ -72,7 +72,9 @@ def test_rates_counts_and_paired_tests_of_the_pr2_are_those_of_the_trials() -> N
 def test_arms_stand_below_each_other_each_with_its_own_baselines() -> None:
     better = [*make_rows("cost", ["1", "00"] * 5), *make_rows("gp", ["01"] * 10)]
     arms = {"one": TrialTable(better), "other": TrialTable(make_rows("gp", ["1", "00", "00"]))}
-    cells = {row[:3]: row[3:] for row in arms_table(arms).rows if row is not None}
+    known = {"one": np.ones(10, dtype=bool), "other": np.arange(3) < 2}
+    cells = {row[:3]: row[3:] for row in arms_table(arms, known).rows if row is not None}
+    assert cells["other", "", "any start known to reach"][2] == "2/3"
     assert cells["one", "1st attempt", "LIC(GP)"][2] == "0/10"
     p = mcnemar(np.ones(10, dtype=bool), np.arange(10) % 2 == 0)
     assert cells["one", "total of two", "LIC(GP)"][2:] == ("10/10", "", f"{p:.2g}")
