@@ -18,7 +18,7 @@ TREES = {
     for path in sorted(PACKAGE.rglob("*.py"))
 }
 MAX_LINES = 400
-MAX_MODULES = 130
+MAX_MODULES = 131
 MAX_IMPORT_S = 0.3
 FLOW = (
     "clutter",

@@ -1,14 +1,10 @@
-"""Fits are kept: what estimators chose from a library, in files, so that each is fitted once.
+"""Fits are kept: what estimators chose from a library, so that each is fitted once.
 
 Choosing settings (hyper-parameters, bandwidths) takes seconds, and so does solving for the weights
-of thousands of rows: both are kept, as plain arrays, and a fit with them is the same bit for bit. A
-file is found by a digest of the rows themselves, of the features, and of the code that fits.
+of thousands of rows: both are kept, and a fit with them is the same bit for bit. A file is found by
+the rows themselves, the features, and the code that fits.
 """
 
-import hashlib
-import os
-import platform
-import tempfile
 from collections import defaultdict
 from collections.abc import Callable, Mapping
 from dataclasses import astuple, fields, is_dataclass
@@ -16,49 +12,27 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy
-from numpy.typing import NDArray
 
 from lic_drake.estimate.estimator import SuccessEstimator
 from lic_drake.estimate.features import ExperienceRows, FeatureMap
 from lic_drake.estimate.gaussian_process import GaussianProcess, Hyperparameters
 from lic_drake.estimate.neighbours import NearestNeighbours
 from lic_drake.estimate.registry import is_built_in
-
-VARIABLE = "LIC_CACHE"
-"""Environment variable with the folder of kept fits, or "off"."""
+from lic_drake.kept import Arrays, keep, kept_path, read_kept
+from lic_drake.types import Vector
 
 _SOLUTION = "solution_"
 _KINDS = {kind.__name__: kind for kind in (GaussianProcess, Hyperparameters, NearestNeighbours)}
 _CODE = [*sorted(Path(__file__).parent.glob("*.py")), Path(__file__).parents[1] / "seeds.py"]
 
 
-def cache_folder() -> Path | None:
-    """Returns the folder of kept fits, by default in the user's cache; None if switched off."""
-    named = os.environ.get(VARIABLE, "")
-    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    return None if named == "off" else Path(named or home, "" if named else "lic_drake")
-
-
-def kept_path(name: str, features: FeatureMap, rows: ExperienceRows) -> Path | None:
+def fit_path(name: str, features: FeatureMap, rows: ExperienceRows) -> Path | None:
     """Returns where the fit of a registered estimator to rows is kept.
 
     None if nothing is kept, or if others registered the estimator: no digest of this package could
     tell when their code has changed.
     """
-    folder = cache_folder()
-    if folder is None or not is_built_in(name):
-        return None
-    digest = hashlib.blake2b(digest_size=16)
-    made_by = (np.__version__, scipy.__version__, platform.machine())
-    digest.update(repr((name, features, made_by)).encode())
-    for path in _CODE:
-        digest.update(path.read_bytes())
-    for array in astuple(rows):
-        digest.update(
-            f"{array.dtype}{array.shape}".encode() + np.ascontiguousarray(array).tobytes()
-        )
-    return folder / f"{name}-{digest.hexdigest()}.npz"
+    return kept_path(name, _CODE, features, astuple(rows)) if is_built_in(name) else None
 
 
 def fit_as_kept(
@@ -68,11 +42,8 @@ def fit_as_kept(
 
     A damaged or foreign file is not trusted; `say` receives a line about it.
     """
-    try:
-        with np.load(path) as file:  # Which refuses objects, and compares checksums.
-            arrays = dict(file)
-        if str(arrays.pop("kept_as")) != path.name:
-            raise ValueError("it was kept under another name")
+
+    def understand(arrays: Arrays) -> tuple[dict[str, Any], Vector | None]:
         solution = arrays.pop(_SOLUTION, None)
         if {name.split(".")[0] for name in arrays} != set(estimator._chosen):
             raise ValueError(f"it holds {', '.join(arrays) or 'nothing'}")
@@ -81,39 +52,27 @@ def fit_as_kept(
                 raise ValueError(f"{name} has another shape, or is not finite")
         if solution is not None and not (solution.ndim == 1 and np.all(np.isfinite(solution))):
             raise ValueError("the solution has another shape, or is not finite")
-        settings = _from_arrays(arrays)
-    except FileNotFoundError:
+        return _from_arrays(arrays), solution
+
+    found = read_kept(path, understand, "fit", say)
+    if found is None:
         return False
-    except Exception as error:  # Whatever is wrong with the file, it only costs a fit.
-        say(f"lic: ignored the kept fit {path}: {' '.join(str(error).split())}")
-        return False
-    estimator.set_params(**settings)
-    estimator.resume(rows.X, rows.y, sample_weight=rows.weight, solution=solution)
+    estimator.set_params(**found[0])
+    estimator.resume(rows.X, rows.y, sample_weight=rows.weight, solution=found[1])
     return True
 
 
 def keep_fit(path: Path, fitted: SuccessEstimator, say: Callable[[str], None]) -> None:
     """Writes what a fit has worked out, atomically; `say` receives a line if that fails."""
-    temporary = None
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        # Several processes may fit the same at a time.
-        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".tmp", delete=False) as file:
-            temporary = file.name
-            arrays: dict[str, Any] = {"kept_as": path.name, **_to_arrays(fitted.chosen)}
-            if fitted.solution_ is not None:
-                arrays[_SOLUTION] = fitted.solution_
-            np.savez(file, **arrays)
-        os.replace(temporary, path)
-    except OSError as error:
-        if temporary is not None:
-            Path(temporary).unlink(missing_ok=True)
-        say(f"lic: cannot keep the fit in {path.parent}: {error.strerror}; set {VARIABLE}")
+    arrays: dict[str, Any] = {**_to_arrays(fitted.chosen)}
+    if fitted.solution_ is not None:
+        arrays[_SOLUTION] = fitted.solution_
+    keep(path, arrays, "fit", say)
 
 
-def _to_arrays(values: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
+def _to_arrays(values: Mapping[str, Any]) -> Arrays:
     """Returns values as arrays; those in a dataclass are called name.Class.field."""
-    arrays: dict[str, NDArray[Any]] = {}
+    arrays: Arrays = {}
     for name, value in values.items():
         if is_dataclass(value):
             inner = _to_arrays({field.name: getattr(value, field.name) for field in fields(value)})
@@ -124,10 +83,10 @@ def _to_arrays(values: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
     return arrays
 
 
-def _from_arrays(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
+def _from_arrays(arrays: Arrays) -> dict[str, Any]:
     """Returns the values that `_to_arrays` turned into arrays."""
     values: dict[str, Any] = {}
-    parts: defaultdict[tuple[str, str], dict[str, NDArray[Any]]] = defaultdict(dict)
+    parts: defaultdict[tuple[str, str], Arrays] = defaultdict(dict)
     for path, array in arrays.items():
         name, *inner = path.split(".", 2)
         if inner:

@@ -156,10 +156,10 @@ def fit_rows(
     Its settings come from the simulated rows; those of other sources change the estimate, by their
     weight, but no setting. Fits are kept, see `lic_drake.estimate.kept`, and found again.
     """
-    from lic_drake.estimate.kept import fit_as_kept, keep_fit, kept_path
+    from lic_drake.estimate.kept import fit_as_kept, fit_path, keep_fit
 
     fitted = make_estimator(estimator, features)
-    path, part = kept_path(estimator, features, rows), rows.simulated
+    path, part = fit_path(estimator, features, rows), rows.simulated
     if path is not None and fit_as_kept(path, fitted, rows, say):
         return fitted
     say(f"fitting {estimator} on {len(rows.y)} {what} ...")

@@ -81,6 +81,7 @@ def demonstrate(
     check_writable(out)
     if cameras is not None:
         make_renderer()  # Fails before the library is learned from.
+    instance = scenario.sample_instance(STREAM, seed)
     say(f"{scenario.category}, evaluation environment {seed}: looking for starts")
     draws = (scenario.sample_goal(STREAM, seed, index) for index in itertools.count())
     p_WG = next(goal for goal in draws if is_reachable(scenario, STREAM, seed, goal))
@@ -100,7 +101,6 @@ def demonstrate(
         observer = Observer(
             scenario=scenario, stream=STREAM, environment=seed, p_WG=p_WG, cameras=cameras
         )
-    instance = scenario.sample_instance(STREAM, seed)
     known = make_starts(scenario, instance)
     traces: list[ReachTrace] = []
 

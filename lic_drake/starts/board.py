@@ -3,7 +3,9 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from importlib.metadata import version
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +14,7 @@ from numpy.typing import ArrayLike
 from lic_drake.clutter.board import ApertureBoard
 from lic_drake.clutter.instance import ClutterInstance
 from lic_drake.errors import RequestError
+from lic_drake.kept import Arrays, keep, kept_path, read_kept
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.start import Start, Starts
 from lic_drake.robots.arm import Arm
@@ -23,6 +26,14 @@ GRID_M = (0.1, 0.05)
 """Distances of neighbouring bases and of heights of the torso in the grid, metres."""
 LATTICE_M = 0.025
 """Largest distance of neighbouring bases and heights of the torso in the lattice, metres."""
+# Starts from so many bases and more are kept; of the training stand there is one.
+_KEPT_FROM = 10
+_PACKAGE = Path(__file__).parents[1]
+_CODE = sorted(
+    path
+    for room in ("clutter", "robots", "scene", "starts")
+    for path in (_PACKAGE / room).glob("*.py")
+)
 # The way from the robot into the clutter, along which the hand points.
 _INTO_CLUTTER = np.array([1.0, 0.0, 0.0])
 
@@ -185,8 +196,16 @@ def _preferred_before_bare_board(
 ) -> Starts:
     """Returns what Eq. (5) prefers in each aperture from each base, where there is anything.
 
-    All environments of a scenario have the same board, but for what is blocked.
+    All environments of a scenario have the same board, but for what is blocked. An arm without a
+    closed form takes seconds, once: what it finds is kept.
     """
+    path = None
+    if len(b0) >= _KEPT_FROM:
+        identity = (arm.digest, arm.skin, board, b0, version("drake"))
+        kinematics = (arm.q_min, arm.q_max, *arm.calc_pose(arm.q_home))
+        path = kept_path("starts", _CODE, identity, kinematics)
+    if path is not None and (kept := read_kept(path, _as_starts, "starts")) is not None:
+        return kept
     centre, columns, rows, aperture_m, bar_m = board
     bare = ApertureBoard(
         board_centre=list(centre), columns=columns, rows=rows, aperture_m=aperture_m, bar_m=bar_m
@@ -201,7 +220,17 @@ def _preferred_before_bare_board(
     ]
     x0 = np.array([start.x0 for start in found]).reshape(-1, 7)
     q = np.array([start.q for start in found]).reshape(-1, len(arm.q_min))
-    return Starts(x0, np.array([start.b0 for start in found]).reshape(-1, 3), q)
+    starts = Starts(x0, np.array([start.b0 for start in found]).reshape(-1, 3), q)
+    if path is not None:
+        keep(path, {"x0": x0, "b0": starts.b0, "q": q}, "starts")
+    return starts
+
+
+def _as_starts(arrays: Arrays) -> Starts:
+    """Returns starts that were kept."""
+    if {len(array) for array in arrays.values()} != {len(arrays["q"])}:
+        raise ValueError("its arrays have different lengths")
+    return Starts(arrays["x0"], arrays["b0"], arrays["q"])
 
 
 def _preferred(

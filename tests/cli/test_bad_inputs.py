@@ -15,7 +15,7 @@ from support import six_joint_arm
 from support.fake_reach import fill_library
 
 from lic_drake.cli.main import main
-from lic_drake.estimate.kept import VARIABLE
+from lic_drake.kept import VARIABLE
 
 PLAIN, SPHERES = "cylinder-clutter", "sphere-aperture-clutter"
 CHECK, TRAIN = "robot check ROBOT", "train NEW --minutes 1 --robot ROBOT"
@@ -202,7 +202,7 @@ OTHERS = [
     plain("demo --robot planar-arm --category foliage-aperture-clutter", "is an arm in the plane"),
     plain(f"demo --category {SPHERES} --library LIBRARY", f"not --category {SPHERES}; choose"),
     plain("demo --category foliage-aperture-clutter --library LIBRARY", "is clutter in space"),
-    plain("demo --robot iiwa14 --category foliage-aperture-clutter", "no experience of iiwa14 in"),
+    robot("frame: column", "frame: column", "six_joint_arm.yaml in", "demo --robot ROBOT"),
     plain("demo --seed 4294967296", "seed indices must be from 0 to 2^32 - 1, got"),
     plain("demo --robot pr2 --set '{clutter: {num_blocked: 20}}'", "from 0 to 19, got 20"),
     plain("gallery NEW --each 0", "argument --each: needs a whole number of 1 or more, got '0'"),

@@ -12,9 +12,9 @@ from support.starts import ARM, LINE
 
 from lic_drake.estimate import gaussian_process
 from lic_drake.estimate.estimator import from_sklearn
-from lic_drake.estimate.kept import VARIABLE, cache_folder
 from lic_drake.estimate.registry import register_estimator
 from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.kept import VARIABLE, cache_folder
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.registry import make_selector
 from lic_drake.select.situation import FailedReach, Situation

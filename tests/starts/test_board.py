@@ -1,4 +1,5 @@
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -6,8 +7,10 @@ from support.pr2_reaches import SCENARIO
 from support.pr2_reference import link_poses
 
 from lic_drake.errors import RequestError, ScenarioError
+from lic_drake.kept import VARIABLE
 from lic_drake.reach.scenario import load_scenario
-from lic_drake.starts import BoardStarts, board_starts, make_starts, training_starts
+from lic_drake.reach.start import Starts
+from lic_drake.starts import BoardStarts, board, board_starts, make_starts, training_starts
 
 INSTANCE = SCENARIO.sample_instance("training", 0)
 STILL = board_starts(SCENARIO, INSTANCE)
@@ -127,3 +130,28 @@ def test_what_has_no_such_starts_is_refused() -> None:
         board_starts(SCENARIO, replace(INSTANCE, p_WA=None))
     with pytest.raises(RequestError, match=r"there is no open aperture at y 2\.0 m"):
         STARTS.nearest_aperture(2.0, 0.9)
+
+
+def test_starts_that_were_kept_are_the_same_and_damaged_ones_are_worked_out_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv(VARIABLE, str(tmp_path))
+
+    def grid() -> Starts:
+        board._preferred_before_bare_board.cache_clear()
+        return board_starts(SCENARIO, INSTANCE, moves=True).grid
+
+    def assert_as_ever(starts: Starts) -> None:
+        for name in ("x0", "b0", "q"):
+            np.testing.assert_array_equal(getattr(starts, name), getattr(STARTS.grid, name))
+
+    assert_as_ever(grid())
+    (path,) = tmp_path.iterdir()
+    with monkeypatch.context() as patched:
+        patched.setattr(board, "_preferred", lambda *args: pytest.fail("worked out again"))
+        assert_as_ever(grid())
+    np.savez(path, kept_as=path.name, x0=np.ones((2, 7)), b0=np.ones((3, 3)), q=np.ones((2, 7)))
+    assert_as_ever(grid())
+    assert "ignored the kept starts" in capsys.readouterr().err
+    assert_as_ever(grid())
+    assert capsys.readouterr().err == ""
