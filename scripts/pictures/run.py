@@ -35,7 +35,7 @@ DEMOS = {
         {"foliage.webp": "film.webp"},
     ),
     "iiwa14": ("lic demo --robot iiwa14", {"iiwa14.png": "attempt2_end.png"}),
-    "panda": ("lic demo --robot panda", {"panda.png": "attempt2_end.png"}),
+    "panda": ("lic demo --robot panda", {"panda.png": "attempt1_end.png"}),
 }
 """Commands, and for each picture the file of the command's that it is a copy of."""
 
