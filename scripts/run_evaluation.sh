@@ -59,12 +59,14 @@ choose() {
     shift 3
     library=models/experience/$category
     lic evaluate "$library/choices" --library "$library" --stream calibration \
-        --environments "$environments" --goals "$goals" --methods gp knn "$@"
+        --environments "$environments" --goals "$goals" "$@"
 }
-choose cylinder-clutter 120 2
-choose passage-clutter 220 1
-choose cylinder-aperture-clutter 100 1
-choose sphere-aperture-clutter 80 1 --set '{clutter: {num_blocked: 10}}'
+choose cylinder-clutter 120 2 --methods gp knn
+choose passage-clutter 220 1 --methods gp knn
+choose cylinder-aperture-clutter 100 1 --methods gp knn
+choose sphere-aperture-clutter 80 1 --methods gp knn --set '{clutter: {num_blocked: 10}}'
+choose iiwa14-sphere-aperture-clutter 80 1 --methods gp
+choose panda-sphere-aperture-clutter 80 1 --methods gp
 
 # The PR2, with half of the apertures blocked; base and torso move, or stay.
 evaluate_pr2() {
@@ -80,7 +82,8 @@ python scripts/bounds/run.py sphere-aperture-clutter --environments 100 --still 
 python scripts/bounds/race.py sphere-aperture-clutter --environments 300
 # Other arms, on pedestals that move.
 for arm in iiwa14 panda; do
-    evaluate $arm-sphere-aperture-clutter 150 1 --methods rnd cost gp
+    evaluate $arm-sphere-aperture-clutter 150 1 --methods rnd cost gp 'gp>cost'
+    python scripts/bounds/race.py $arm-sphere-aperture-clutter --environments 150
 done
 
 # Before foliage: apertures and goal seen by cameras or known; learned among spheres or foliage.
