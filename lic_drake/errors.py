@@ -1,5 +1,6 @@
-"""Exceptions for user errors; the command line prints them as one line."""
+"""Exceptions for user errors, printed as one line by the command line, and remarks to users."""
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -66,3 +67,8 @@ def check_writable(folder: Path) -> None:
         probe = folder / ".write-test"
         probe.touch()
         probe.unlink()
+
+
+def remark(line: str) -> None:
+    """Prints a line on the standard error, which keeps progress apart from results."""
+    print(line, file=sys.stderr, flush=True)

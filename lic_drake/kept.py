@@ -7,7 +7,6 @@ Nothing is unpickled, and a damaged or foreign file only costs the work again, a
 import hashlib
 import os
 import platform
-import sys
 import tempfile
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -17,6 +16,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from lic_drake.errors import remark
+
 VARIABLE = "LIC_CACHE"
 """Environment variable with the folder of what is kept, or "off"."""
 
@@ -24,11 +25,6 @@ type Arrays = dict[str, NDArray[Any]]
 """Arrays by name."""
 
 _NAME = "kept_as"
-
-
-def aside(line: str) -> None:
-    """Prints a line where it is no part of a result."""
-    print(line, file=sys.stderr, flush=True)
 
 
 def cache_folder() -> Path | None:
@@ -65,7 +61,7 @@ def kept_path(
 
 
 def read_kept[T](
-    path: Path, understand: Callable[[Arrays], T], what: str, say: Callable[[str], None] = aside
+    path: Path, understand: Callable[[Arrays], T], what: str, say: Callable[[str], None] = remark
 ) -> T | None:
     """Returns what a kept file means, or None if there is none or it is damaged.
 
@@ -89,7 +85,7 @@ def read_kept[T](
 
 
 def keep(
-    path: Path, arrays: Mapping[str, Any], what: str, say: Callable[[str], None] = aside
+    path: Path, arrays: Mapping[str, Any], what: str, say: Callable[[str], None] = remark
 ) -> None:
     """Writes arrays, atomically; `say` receives a line if that fails."""
     temporary = None

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from lic_drake.config import read_mapping
+from lic_drake.errors import remark
 from lic_drake.paths import find_library
 
 if TYPE_CHECKING:
@@ -225,8 +226,3 @@ def _shown(value: Any) -> str:
         first = ", ".join(map(_shown, value[:10])) or "none"
         return f"{first}, ..." if len(value) > 10 else first
     return f"{value:.4g}" if isinstance(value, float) else str(value)
-
-
-def remark(line: str) -> None:
-    """Prints a line on the standard error, which keeps progress apart from results."""
-    print(line, file=sys.stderr, flush=True)

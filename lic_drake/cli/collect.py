@@ -13,9 +13,9 @@ from lic_drake.cli.arguments import (
     Subparsers,
     add_command,
     print_result,
-    remark,
     workers_of,
 )
+from lic_drake.errors import remark
 
 if TYPE_CHECKING:
     from lic_drake.experience.collect import CollectionRequest

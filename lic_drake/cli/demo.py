@@ -11,11 +11,10 @@ from lic_drake.cli.arguments import (
     overrides_of,
     print_result,
     quick_imports,
-    remark,
     whole_number,
     with_robot,
 )
-from lic_drake.errors import LicError, check_writable
+from lic_drake.errors import LicError, check_writable, remark
 from lic_drake.paths import shipped_libraries, shipped_library
 
 _FOLIAGE, _SPHERES = "foliage-aperture-clutter", "sphere-aperture-clutter"

@@ -9,9 +9,9 @@ from lic_drake.cli.arguments import (
     add_command,
     add_count,
     print_result,
-    remark,
     workers_of,
 )
+from lic_drake.errors import remark
 
 
 def add_parser(subparsers: Subparsers) -> None:

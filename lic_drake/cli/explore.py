@@ -10,10 +10,9 @@ from lic_drake.cli.arguments import (
     Subparsers,
     add_command,
     quick_imports,
-    remark,
     whole_number,
 )
-from lic_drake.errors import LicError
+from lic_drake.errors import LicError, remark
 from lic_drake.paths import find_library, shipped_libraries, shipped_library
 
 if TYPE_CHECKING:

@@ -9,9 +9,8 @@ from lic_drake.cli.arguments import (
     add_command,
     print_result,
     quick_imports,
-    remark,
 )
-from lic_drake.errors import LicError, check_writable, quoted
+from lic_drake.errors import LicError, check_writable, quoted, remark
 
 
 def add_parser(subparsers: Subparsers) -> None:

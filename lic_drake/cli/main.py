@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import lic_drake
 from lic_drake.cli import collect, demo, evaluate, experience, explore, fit, reach, robot, select
-from lic_drake.cli.arguments import BROKEN_PIPE, INTERRUPTED, USER_ERROR, remark
-from lic_drake.errors import LicError
+from lic_drake.cli.arguments import BROKEN_PIPE, INTERRUPTED, USER_ERROR
+from lic_drake.errors import LicError, remark
 
 SUBCOMMANDS = (demo, explore, reach, select, fit, collect, experience, evaluate, robot)
 """Modules with `add_parser(subparsers)`, which sets `run(args) -> int` as a parser default."""

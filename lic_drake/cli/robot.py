@@ -10,12 +10,11 @@ from lic_drake.cli.arguments import (
     category_of,
     overrides_of,
     print_result,
-    remark,
     whole_number,
     with_robot,
     workers_of,
 )
-from lic_drake.errors import RenderingError, check_writable
+from lic_drake.errors import RenderingError, check_writable, remark
 
 
 def add_parser(subparsers: Subparsers) -> None:

@@ -8,9 +8,8 @@ from lic_drake.cli.arguments import (
     add_command,
     print_result,
     quick_imports,
-    remark,
 )
-from lic_drake.errors import LicError
+from lic_drake.errors import LicError, remark
 from lic_drake.paths import shipped_library
 
 

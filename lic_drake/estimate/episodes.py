@@ -26,9 +26,10 @@ def read_episodes(path: Path) -> pa.Table:
     """Returns what each episode began with, and whether it succeeded.
 
     A column for each number of the first frame: those of a vector `observation.state` are
-    observation.state_0, observation.state_1 and so on. Images, texts, and vectors of different
-    lengths are left out. An episode succeeded if any of its frames did: `next.success` of LeRobot
-    (versions 2 and 3), a positive reward of robomimic, whose tasks reward nothing else.
+    observation.state_0, observation.state_1 and so on. Images, texts, vectors of different
+    lengths, and what only some episodes have are left out. An episode succeeded if any of its
+    frames did: `next.success` of LeRobot (versions 2 and 3), a positive reward of robomimic, whose
+    tasks reward nothing else.
 
     Args:
         path: See `is_data_set`.
@@ -86,14 +87,15 @@ def _read_robomimic(path: Path) -> pa.Table:
                         first.setdefault(name, []).append(values[0])
                 first["demo"].append(int(demo.rpartition("_")[2]))
                 won.append(bool(group["rewards"][:].max() > 0.0))
-    except (OSError, KeyError, ValueError) as error:
+    except (OSError, KeyError, ValueError, IndexError, AttributeError, TypeError) as error:
         raise LibraryError(
             f"cannot read {path} ({error}); it needs data/demo_N with obs, actions and rewards, as"
             " robomimic's dataset_states_to_obs.py writes them"
         ) from None
     columns: dict[str, Any] = {}
     for name, values in first.items():
-        columns |= _numbered(name, values)
+        if len(values) == len(won):  # What only some have is no column.
+            columns |= _numbered(name, values)
     return pa.table(columns | {SUCCESS: np.array(won, dtype=bool)})
 
 

@@ -2,7 +2,6 @@
 
 import gc
 import math
-import sys
 import time
 from collections import defaultdict
 from collections.abc import Callable
@@ -14,7 +13,7 @@ from uuid import uuid4
 
 import numpy as np
 
-from lic_drake.errors import LibraryError, RequestError
+from lic_drake.errors import LibraryError, RequestError, remark
 from lic_drake.evaluate.trials import TrialRow, read_trials, write_trials
 from lic_drake.experience.runner import Task, refuse_failed, run_tasks, shard_name
 from lic_drake.experience.store import ExperienceLibrary
@@ -258,8 +257,7 @@ class _Strategies:
         arm, category = scenario.arm(), scenario.category
         learns = any(needs_library(method) for method in evaluation.methods)
         columns = ExperienceLibrary(evaluation.experience).columns() if learns else None
-        aside = partial(print, file=sys.stderr, flush=True)
-        make = partial(make_selector, columns=columns, category=category, say=aside)
+        make = partial(make_selector, columns=columns, category=category, say=remark)
         self._fitted: Callable[[str], Selector] = cache(partial(make, arm=arm))
 
     def selector(self, method: str, environment: int, goal: int) -> Selector:

@@ -228,9 +228,12 @@ def _preferred_before_bare_board(
 
 def _as_starts(arrays: Arrays) -> Starts:
     """Returns starts that were kept."""
-    if {len(array) for array in arrays.values()} != {len(arrays["q"])}:
-        raise ValueError("its arrays have different lengths")
-    return Starts(arrays["x0"], arrays["b0"], arrays["q"])
+    x0, b0, q = (arrays[name] for name in ("x0", "b0", "q"))
+    if (x0.shape, b0.shape, q.ndim) != ((len(q), 7), (len(q), 3), 2):
+        raise ValueError("its arrays have other shapes")
+    if not all(np.all(np.isfinite(array)) for array in (x0, b0, q)):
+        raise ValueError("its arrays are not finite")
+    return Starts(x0, b0, q)
 
 
 def _preferred(

@@ -106,12 +106,14 @@ def test_rollouts_are_read_from_either(tmp_path, states, won):
         np.testing.assert_array_equal(rollouts.rows.y, won)
 
 
-def test_vectors_of_different_lengths_are_no_columns(tmp_path, states, won):
+def test_vectors_of_different_lengths_and_what_only_some_have_are_no_columns(tmp_path, states, won):
     path = write_robomimic(tmp_path / "rollouts.h5", states, won)
     with h5py.File(path, "a") as file:
         for e in range(EPISODES):
             file[f"data/demo_{e}/obs/seen"] = np.zeros((FRAMES, 1 + e % 2))
-    assert not any("seen" in name for name in read_episodes(path).column_names)
+        file["data/demo_3/obs/seldom"] = np.zeros((FRAMES, 1))
+    names = read_episodes(path).column_names
+    assert "obs/object_0" in names and not any("se" in name.split("/")[-1] for name in names)
 
 
 def test_what_is_missing_is_named(tmp_path, states, won):
@@ -124,6 +126,10 @@ def test_what_is_missing_is_named(tmp_path, states, won):
         read_episodes(folder)
     file = write_robomimic(tmp_path / "rollouts.hdf5", states, won, rewards=False)
     with pytest.raises(LicError, match="with obs, actions and rewards"):
+        read_episodes(file)
+    with h5py.File(file, "a") as content:
+        content["data/demo_3/obs/group/of"] = 1.0
+    with pytest.raises(LicError, match="cannot read"):
         read_episodes(file)
     file.write_bytes(b"no file of HDF5")
     with pytest.raises(LicError, match="cannot read"):
