@@ -27,6 +27,7 @@ from lic_drake.select.registry import IMAGINE
 from lic_drake.types import BoolVector
 from scripts.bounds.race import reached
 from scripts.common import load_trials, run_tables, write_tables
+from scripts.learning_curve.collection import collection_table
 
 NUMBERS = {
     "cylinder-clutter": 1,
@@ -203,7 +204,7 @@ def write(results: Path) -> list[Path]:
     tables["table_arms"] = [arms_table(arms, known)]
     every = ExperienceLibrary(results / "bounds" / ARMS["PR2"] / "random")
     pr2 = pr2_table(arms["PR2"], known["PR2"])
-    tables["table_pr2"] = [pr2, oracle_table(arms["PR2"], every)]
+    tables["table_pr2"] = [pr2, oracle_table(arms["PR2"], every), collection_table(results)]
     foliage = load_trials(results, FOLIAGE)
     reachable = reached(results, FOLIAGE, len(foliage.pairs("known")))
     tables["table_foliage"] = [foliage_table(foliage, reachable)]
