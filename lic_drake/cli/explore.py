@@ -103,7 +103,7 @@ def _explore(meshcat: "Meshcat", path: Path, method: str) -> "Explorer":
     library = ExperienceLibrary(path)
     scenario, columns = library.scenario(), library.columns()
     remark(f"learning from {len(columns['success'])} reaches of {scenario.category}")
-    selector = make_selector(method, scenario.arm(), columns, None, scenario.category, say=remark)
+    selector = make_selector(method, columns, say=remark)
     assert isinstance(selector, LicSelector)
     return Explorer(meshcat, scenario, selector)
 

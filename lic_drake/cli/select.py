@@ -74,8 +74,7 @@ def run(args: argparse.Namespace) -> int:
     check_goal(scenario, p_WG - bases[np.argmin(np.linalg.norm((bases - p_WG)[:, 1:], axis=1))])
     failed = tuple(read_failure(scenario, starts, text) for text in args.failed)
     rng = np.random.default_rng(args.seed)
-    columns, category = library.columns(), scenario.category
-    second = features_of(category).second
+    second = features_of(scenario.category).second
     if second is not None and args.method in estimator_names():  # It has a LIC-2.
         needed = [name.removeprefix(FIRST_PREFIX) for name in second.observed]
         for reach in failed:
@@ -88,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
             f"{library.path} has no {FEWEST} choices of {args.method} for attempt {attempt}, so"
             " no probability is known; make some as `lic select --help` says, or omit --least"
         )
-    selector = make_selector(args.method, scenario.arm(), columns, rng, category, say=remark)
+    selector = make_selector(args.method, library.columns(), rng, remark)
     chosen = selector.select(Situation(p_WG=p_WG, starts=starts, failed=failed))
     assert chosen.start.q is not None
     values = {

@@ -63,11 +63,13 @@ def make_taxels(arm: Arm, per_metre: float) -> TaxelLayout:
     Their density, 1/m, is 100 in the plane in paper V-A.
     """
     if arm.is_planar:
-        return planar_taxels(arm.skin, per_metre)
+        return planar_taxels(arm.skin, arm.link_names, per_metre)
     return surface_taxels(arm.skin, arm.link_names, per_metre)
 
 
-def planar_taxels(skin: tuple[SkinShape, ...], per_metre: float = 100.0) -> TaxelLayout:
+def planar_taxels(
+    skin: tuple[SkinShape, ...], link_names: tuple[str, ...], per_metre: float = 100.0
+) -> TaxelLayout:
     """Returns taxels around each link's capsule in the plane of motion, z = 0.
 
     Rows on both long sides, symmetric about the link's centre, and five taxels on each end cap, as
@@ -75,7 +77,8 @@ def planar_taxels(skin: tuple[SkinShape, ...], per_metre: float = 100.0) -> Taxe
     """
     links, positions, normals = [], [], []
     cap = np.deg2rad(CAP_ANGLES_DEG)
-    for link, capsule in enumerate(skin):
+    for capsule in skin:
+        link = link_names.index(capsule.link)
         radius, length = capsule.size
         along = capsule.R_LS[:, 2]
         side = np.cross([0.0, 0.0, 1.0], along)

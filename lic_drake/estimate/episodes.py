@@ -37,7 +37,10 @@ def read_episodes(path: Path) -> pa.Table:
     Raises:
         LicError: It cannot be read, does not say what succeeded, or has no episodes.
     """
-    return _read_robomimic(path) if path.suffix in HDF5 else _read_lerobot(path)
+    table = _read_robomimic(path) if path.suffix in HDF5 else _read_lerobot(path)
+    if not table.num_rows:
+        raise EstimateError(f"{path} has no episodes; record some")
+    return table
 
 
 def _read_lerobot(folder: Path) -> pa.Table:
@@ -58,6 +61,8 @@ def _read_lerobot(folder: Path) -> pa.Table:
     columns: dict[str, Any] = {}
     for name in names:
         columns |= _numbered(name, first[name].to_pylist())
+    if missing := len(every["episode_index"].unique()) - first.num_rows:
+        raise EstimateError(f"{missing} episodes of {folder} have no frame 0; record them again")
     won = np.array(every["next.success"].to_pylist(), dtype=bool).reshape(every.num_rows)
     succeeded = np.unique(every["episode_index"].to_numpy()[won])
     return pa.table(columns | {SUCCESS: np.isin(columns["episode_index"], succeeded)})

@@ -93,6 +93,8 @@ def read_rollouts(
     if not isinstance(table, pa.Table):
         path = Path(table)
         table = read_episodes(path) if is_data_set(path) else read_table(path)
+    if not given or not decide:
+        raise EstimateError("name at least one column that is given and one that is decided")
     names = [*given, *decide, success]
     if twice := {name for name in names if names.count(name) > 1}:
         raise EstimateError(
@@ -101,7 +103,8 @@ def read_rollouts(
     for name in [*names, *([group] if group else [])]:
         if (count := table.column_names.count(name)) != 1:
             raise EstimateError(
-                f"the table has {count or 'no'} columns {quoted(name)}; it has"
+                f"the table has {f'{count} columns' if count else 'no column'} {quoted(name)};"
+                " it has"
                 f" {', '.join(map(quoted, dict.fromkeys(table.column_names)))}"
             )
     X = np.column_stack([_numbers(table, name) for name in [*given, *decide]])
@@ -127,8 +130,8 @@ def _numbers(table: pa.Table, name: str) -> Vector:
     kind = table.schema.field(name).type
     if not (kinds.is_integer(kind) or kinds.is_floating(kind) or kinds.is_boolean(kind)):
         raise EstimateError(
-            f"column {name} holds {kind}, but must hold numbers; make a number, or columns of them,"
-            " of it"
+            f"column {name} holds {kind}, but must hold numbers; encode it as one or more"
+            " numeric columns"
         )
     values = np.array(table[name].to_pylist(), dtype=np.float64)  # None becomes NaN.
     if missing := int(np.sum(~np.isfinite(values))):

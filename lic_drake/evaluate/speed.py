@@ -10,6 +10,7 @@ from statistics import median
 from typing import Any
 
 import lic_drake
+from lic_drake.errors import RequestError
 from lic_drake.evaluate.trial import random_requests
 from lic_drake.reach.scenario import Scenario
 from lic_drake.reach.session import run_reach, simulate_request
@@ -43,6 +44,8 @@ def measure_reaches(scenario: Scenario, reaches: int, per_environment: int = 5) 
     done = sum((trace.statistics for trace in traces), Counter())
     profiled_s = sum(trace.time_s[-1] for trace in traces if trace.time_s)
     moving = [record for record in records if record.duration_s > 0.0]
+    if not moving or not profiled_s:
+        raise RequestError("no reach began, so none can be timed; change starts or goals")
     return {
         "robot": scenario.robot,
         "category": scenario.category,

@@ -104,6 +104,8 @@ def random_requests(
     for environment in range(environments):
         instance = scenario.sample_instance(stream, environment)
         starts = make_starts(scenario, instance).grid.without_q()
+        if not len(starts):
+            raise RequestError(f"no discrete start is feasible in environment {environment}")
         for goal in range(goals):
             index = 0 if scenario.task.goal_area is None else goal
             p_WG = scenario.sample_goal(stream, environment, index)
@@ -234,6 +236,9 @@ def _check(evaluation: Evaluation) -> None:
             raise RequestError(f"method {method} is there {methods.count(method)} times; keep one")
     if not 1 <= evaluation.environments <= MOST:
         raise RequestError(f"environments must be from 1 to {MOST}, got {evaluation.environments}")
+    for name in ("goals", "attempts"):
+        if (value := getattr(evaluation, name)) < 1:
+            raise RequestError(f"{name} must be at least 1, got {value}")
     held = results.shard_paths() if results.path.is_dir() else []
     if set(held) - {evaluation.trials_path}:
         raise LibraryError(
@@ -254,11 +259,11 @@ class _Strategies:
 
     def __init__(self, evaluation: Evaluation, scenario: Scenario) -> None:
         self._stream = evaluation.stream
-        arm, category = scenario.arm(), scenario.category
         learns = any(needs_library(method) for method in evaluation.methods)
         columns = ExperienceLibrary(evaluation.experience).columns() if learns else None
-        make = partial(make_selector, columns=columns, category=category, say=remark)
-        self._fitted: Callable[[str], Selector] = cache(partial(make, arm=arm))
+        self._fitted: Callable[[str], Selector] = cache(
+            partial(make_selector, columns=columns, say=remark)
+        )
 
     def selector(self, method: str, environment: int, goal: int) -> Selector:
         """Returns the strategy for a trial."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import lic_drake
 from lic_drake.errors import LibraryError, readable_errors
-from lic_drake.evaluate.statistics import Count
+from lic_drake.evaluate.statistics import Count, count
 from lic_drake.experience.schema import opened, schema_of, write_atomically, write_table
 
 VERSION = 1
@@ -116,22 +116,21 @@ class TrialTable:
 
     def success(self, method: str, attempts: int, variant: str = "") -> NDArray[np.bool_]:
         """Returns whether each of `pairs(variant)` succeeds within some attempts, shape (n,)."""
-        trials = self.trials(method, variant)
-        for (environment, goal), rows in trials.items():
-            if len(rows) < attempts and not rows[-1].success:
-                raise LibraryError(
-                    f"{_name(method, variant)} made {len(rows)} of {attempts} attempts at goal"
-                    f" {goal} of environment {environment}; evaluate with more attempts"
-                )
+        trials, most = self.trials(method, variant), self.max_attempts(method, variant)
+        # A trial may end early in a reach that was only believed to succeed, see `Observer`.
+        if most < attempts and not all(rows[-1].success for rows in trials.values()):
+            raise LibraryError(
+                f"{_name(method, variant)} made {most} of {attempts} attempts; evaluate with more"
+                " attempts"
+            )
         return np.array(
             [any(row.success for row in trials[pair][:attempts]) for pair in self.pairs(variant)]
         )
 
     def conditional(self, method: str, attempt: int, variant: str = "") -> Count:
-        """Counts an attempt's successes among the trials in which all earlier ones failed."""
-        before = int(self.success(method, attempt - 1, variant).sum())
-        after = self.success(method, attempt, variant)
-        return Count(int(after.sum()) - before, len(after) - before)
+        """Counts an attempt's successes among the trials that came to it."""
+        trials = self.trials(method, variant).values()
+        return count(np.array([r[attempt - 1].success for r in trials if len(r) >= attempt], bool))
 
     def max_attempts(self, method: str, variant: str = "") -> int:
         """Returns the largest number of attempts in a method's trials."""

@@ -54,7 +54,11 @@ def read_table(path: Path) -> pa.Table:
 
 def read_rows(path: Path) -> list[dict[str, object]]:
     """Reads the rows of a CSV or Parquet file, for `add_rows`."""
-    rows: list[dict[str, object]] = read_table(path).to_pylist()
+    table = read_table(path)
+    for name in table.column_names:
+        if (count := table.column_names.count(name)) > 1:
+            raise LibraryError(f"{path} has {count} columns {quoted(name)}; keep one")
+    rows: list[dict[str, object]] = table.to_pylist()
     return rows
 
 

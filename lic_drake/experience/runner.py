@@ -13,7 +13,7 @@ from itertools import groupby
 from typing import Any
 
 import lic_drake
-from lic_drake.errors import ClusterError, LibraryError, LicError
+from lic_drake.errors import ClusterError, LibraryError, LicError, PerceptionError, RequestError
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.experience.workers import Workers
 from lic_drake.reach.request import ReachRecord, ReachRequest
@@ -211,6 +211,8 @@ def run_tasks[R](
             else:
                 failed[task.name] = f"its worker process died {TRIES} times"
             return True
+        except (PerceptionError, RequestError) as error:  # Of this environment only.
+            failed[task.name] = str(error)
         except LicError:
             raise
         except CancelledError:

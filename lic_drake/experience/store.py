@@ -161,13 +161,12 @@ class ExperienceLibrary:
         """
         index, _, count = share.partition("/")
         path = self.path / f"_collecting-{index}-of-{count}.lock"
-        locks = self.path.glob("_collecting-*.lock")
-        others = [other for other in locks if not other.name.endswith(f"-of-{count}.lock")]
         lock = FileLock(path, timeout=0)
         with readable_errors(path, "lock"):
             try:
                 lock.acquire()
-                for other in others:
+                locks = self.path.glob("_collecting-*.lock")
+                for other in (p for p in locks if not p.name.endswith(f"-of-{count}.lock")):
                     # Another process may hold it briefly, just to test it.
                     with FileLock(other, timeout=1.0):
                         pass

@@ -74,6 +74,8 @@ def _fit_ball(
     fit = least_squares(residuals, first, loss="soft_l1", f_scale=2.0)
     # The depth's derivative is unbounded at the ball's rim.
     jacobian = fit.jac[_inside(rays, fit.x, radius_m) > RIM * radius_m**2 * np.sum(rays**2, axis=1)]
+    if np.linalg.matrix_rank(jacobian) < 3:
+        raise PerceptionError("only the ball's rim is in view; move the external camera")
     return fit.x, np.linalg.inv(jacobian.T @ jacobian)
 
 

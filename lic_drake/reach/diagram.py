@@ -30,7 +30,6 @@ class ReachDiagram:
     diagram: Diagram
     scene: Scene
     config: SceneConfig
-    sensor: TactileSensor
     controller: LeafSystem
 
     def set_start(self, context: Context, q: Vector, p_RG: Vector) -> None:
@@ -91,4 +90,4 @@ def make_reach_diagram(
 
     diagram = builder.Build()
     diagram.set_name("reach")
-    return ReachDiagram(diagram, scene, scenario.scene, sensor, mover)
+    return ReachDiagram(diagram, scene, scenario.scene, mover)

@@ -245,16 +245,9 @@ class ReachRecord:
     def start(self) -> Start:
         """The start as in the request, with the joint angles that the reach had there, if any."""
         b0 = np.array([self.base_x, self.base_y, self.torso])
-        return Start(self._pose("start"), b0, np.array(self.q_start) if self.q_start else None)
-
-    @property
-    def final(self) -> Vector:
-        """The final hand pose x_inf in W, shape as that of the start; NaN if it never began."""
-        return self._pose("final")
-
-    def _pose(self, name: str) -> Vector:
         axes = POSE_AXES[IN_SPACE if self.in_space else IN_PLANE]
-        return np.array([getattr(self, f"{name}_{axis}") for axis in axes])
+        x0 = np.array([getattr(self, f"start_{axis}") for axis in axes])
+        return Start(x0, b0, np.array(self.q_start) if self.q_start else None)
 
 
 def check_goal(scenario: Scenario, p_RG: Vector) -> None:

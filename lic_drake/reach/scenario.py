@@ -167,9 +167,10 @@ def _check_stiffness(arm: Arm, mpc: MpcConfig, source: str) -> None:
     The controller lets forces rise by small steps that it predicts with a soft contact, whereas a
     rigid one changes them by the joint's stiffness.
     """
-    rise_N = np.deg2rad(mpc.max_change_deg) * arm.stiffness / arm.levers
+    levers = np.where(arm.levers > 0.0, arm.levers, np.inf)  # Without skin beyond it: no force.
+    rise_N = np.deg2rad(mpc.max_change_deg) * arm.stiffness / levers
     worst = int(np.argmax(rise_N))
-    if np.isfinite(rise_N[worst]) and rise_N[worst] > mpc.force_threshold_N:
+    if np.isfinite(mpc.max_change_deg) and rise_N[worst] > mpc.force_threshold_N:
         raise ScenarioError(
             f"{source}: {arm.joint_names[worst]} of {arm.name}, {arm.stiffness[worst]:g} Nm/rad, is"
             f" too stiff for a controller at {mpc.rate_hz:g} Hz: a step of {mpc.max_change_deg:g}"

@@ -232,7 +232,9 @@ class RobotFile:
         pedestal_m = 0.0 if self.carriage else self.base.xyz[2] + self.height_range_m[1]
         if pedestal_m > 0.0:
             frame = plant.GetFrameByName(self.base.frame, arm)
-            X_BP = RigidTransform(np.array([0.0, 0.0, -0.5 * pedestal_m]))
+            # Upright, however the arm is mounted on it.
+            R_BR = RollPitchYaw(np.deg2rad(self.base.rpy_deg)).ToRotationMatrix().inverse()
+            X_BP = RigidTransform(R_BR, R_BR @ np.array([0.0, 0.0, -0.5 * pedestal_m]))
             column = Cylinder(_PEDESTAL_RADIUS_M, pedestal_m)
             X_LP = frame.GetFixedPoseInBodyFrame() @ X_BP
             body = frame.body()

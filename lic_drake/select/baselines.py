@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import NamedTuple, Self
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from lic_drake.errors import RequestError
 from lic_drake.reach.start import IN_PLANE, IN_SPACE
@@ -52,10 +53,7 @@ def corridor_cost(x0: Vector, p_WG: Vector, hand: Hand) -> Vector:
     if in_plane:
         direction = np.column_stack([np.cos(x0[:, 2]), np.sin(x0[:, 2])])
     else:
-        w, x, y, z = x0[:, 3:].T
-        direction = np.column_stack(
-            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)]
-        )
+        direction = Rotation.from_quat(x0[:, 3:], scalar_first=True).apply([1.0, 0.0, 0.0])
     cos_delta = np.sum(way * direction, axis=1) / np.maximum(distance, 1e-12)
     sin_delta = np.sqrt(np.maximum(0.0, 1.0 - cos_delta**2))
     aside = hand.length_m * np.where(cos_delta >= 0.0, sin_delta, 1.0)

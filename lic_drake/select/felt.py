@@ -97,8 +97,10 @@ def feel(
     for trace in traces:
         tracks = _tracks(trace, arm, layout, radius, known)
         moved = [track for track in tracks if np.linalg.norm(track.last - track.first) > SAME_M]
-        # Those of earlier reaches were pushed on; of two that overlap the later one is there now.
-        pushed = [track.last for track in sorted(moved, key=lambda track: -track.sample)]
+        # What an earlier reach pushed is there unless it was pushed on; of two that overlap the
+        # later one is there now.
+        there = [p for p in pushed if all(np.linalg.norm(t.first - p) > radius for t in moved)]
+        pushed = [*(t.last for t in sorted(moved, key=lambda t: -t.sample)), *there]
         final = len(trace.q) - 2
         for track in tracks:
             long = track.count >= STILL_SAMPLES

@@ -137,6 +137,8 @@ class LicSelector:
             # A candidate just beside the end of a region is one that nothing can improve.
             if region >= 0:
                 best.consider(self.improve(program, regions[region], start))
+        if not len(starts.grid):
+            raise RequestError("no discrete start is feasible here")
         if best.start is None:
             raise RequestError(
                 "no start is left away from the failed ones that satisfies the constraints of the"

@@ -196,7 +196,7 @@ class LicProgram(MathematicalProgram):
         """Returns for which of n starts a binding's variables are known, and its values there."""
         index = self.FindDecisionVariableIndices(binding.variables())
         q = np.full((len(starts), len(self.q)), np.nan) if starts.q is None else starts.q
-        if max(index) >= 3 + q.shape[1]:
+        if max(index, default=-1) >= 3 + q.shape[1]:
             raise RequestError(
                 f"{binding} has variables other than b0 and q, so that it cannot be evaluated for"
                 " the candidates of a selection; express it by program.b0 and program.q"

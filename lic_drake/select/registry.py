@@ -12,7 +12,6 @@ from lic_drake.errors import RequestError
 from lic_drake.estimate.features import PLANAR_LIC1, ExperienceRows, FeatureMap, features_of
 from lic_drake.estimate.registry import estimator_names, make_estimator
 from lic_drake.experience.pairs import pair_reaches
-from lic_drake.robots.arm import Arm
 from lic_drake.select.baselines import CostSelector, RandomSelector
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.objective import SuccessModel
@@ -85,20 +84,17 @@ def needs_library(method: str) -> bool:
 
 def make_selector(
     method: str,
-    arm: Arm,
     columns: Columns | None = None,
     rng: np.random.Generator | None = None,
-    category: str = "cylinder-clutter",
     say: Callable[[str], None] = silent,
 ) -> Selector:
     """Returns a strategy, fitted to a library if it learns from one; see `fit_model`.
 
     Args:
         method: See `method_names`.
-        arm: The robot.
-        columns: Columns of the experience library, if it learns from one.
+        columns: Columns of the experience library, if it learns from one. The clutter category
+            there says what LIC observes.
         rng: Source of draws for RND; by default always the same ones.
-        category: Clutter category, which says what LIC observes.
         say: Receives a line before and after each fit, and before what else takes long.
 
     Raises:
@@ -106,7 +102,7 @@ def make_selector(
     """
     parts = check_method(method)
     if len(parts) > 1:
-        first, later = (make_selector(part, arm, columns, rng, category, say) for part in parts)
+        first, later = (make_selector(part, columns, rng, say) for part in parts)
         return FallbackSelector(first=first, later=later, method=method)
     if not needs_library(method):
         rng = np.random.default_rng(0) if rng is None else rng
@@ -116,9 +112,10 @@ def make_selector(
     if method == IMAGINE:
         from lic_drake.select.imagine import ImaginingSelector
 
-        lic = make_selector("gp", arm, columns, rng, category, say)
+        lic = make_selector("gp", columns, rng, say)
         assert isinstance(lic, LicSelector)
         return ImaginingSelector(lic, say=say)
+    category = str(columns["category"][0])
     features, estimator, second = features_of(category), method, None
     if method not in estimator_names():
         estimator = method[:-1]

@@ -17,7 +17,8 @@ from lic_drake.types import BoolVector, Vector
 RETRY_DISTANCES_M = (0.1, 0.05, 0.025, 0.0, -1.0)
 """A further attempt starts more than the first of these from all failed ones, with the hand across
 x or, in space, with base and torso: the "local neighborhood" of paper VI-A, whose size it does not
-state; one grid step. Where that leaves no start, the next of them counts; -1 excludes nothing."""
+state; one grid step. Where that leaves no start, the next of them counts; -1 excludes only
+the failed starts themselves."""
 
 
 @dataclass(frozen=True, kw_only=True)

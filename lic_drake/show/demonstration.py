@@ -92,8 +92,7 @@ def demonstrate(
 
     def select_with(name: str) -> Selector:
         rng = np.random.default_rng(seed)
-        columns, category = library.columns(), scenario.category
-        return make_selector(name, scenario.arm(), columns, rng, category, say=say)
+        return make_selector(name, library.columns(), rng, say)
 
     selector = select_with(method)
     observer = None

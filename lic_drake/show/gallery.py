@@ -103,14 +103,8 @@ def choose_exhibits(
     every trial. The library gives the scenario, too, with values of YAML text put over it.
     """
     scenario = library.scenario(overrides)
-    selector = make_selector(
-        method,
-        scenario.arm(),
-        library.columns(),
-        np.random.default_rng(first_environment),
-        scenario.category,
-        say=say,
-    )
+    rng = np.random.default_rng(first_environment)
+    selector = make_selector(method, library.columns(), rng, say)
     wanted = {True: each, False: each}
     exhibits: list[Exhibit] = []
     goals = ((i, scenario.sample_goal(STREAM, i)) for i in itertools.count(first_environment))

@@ -74,7 +74,7 @@ def main() -> None:
     args = parser.parse_args()
     scenario = ExperienceLibrary(args.results / args.category / "reaches").scenario()
     columns = ExperienceLibrary(shipped_library(args.category)).columns()
-    selector = make_selector("gp", scenario.arm(), columns, category=scenario.category)
+    selector = make_selector("gp", columns)
     assert isinstance(selector, LicSelector)
     requests = {}
     for i in np.flatnonzero(~reached(args.results, args.category, args.environments)).tolist():

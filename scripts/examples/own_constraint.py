@@ -6,7 +6,7 @@ import lic_drake as lic
 
 library = lic.ExperienceLibrary(lic.shipped_library("sphere-aperture-clutter"))
 scenario = library.scenario()
-selector = lic.make_selector("knn", scenario.arm(), library.columns(), category=scenario.category)
+selector = lic.make_selector("knn", library.columns())
 starts = lic.make_starts(scenario, scenario.sample_instance("evaluation", 0))
 p_WG = scenario.sample_goal("evaluation", 0)
 situation = lic.Situation(p_WG=p_WG, starts=starts)

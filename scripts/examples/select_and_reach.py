@@ -8,7 +8,7 @@ import lic_drake as lic
 
 library = lic.ExperienceLibrary(lic.shipped_library("passage-clutter"))
 scenario = library.scenario()
-selector = lic.make_selector("gp", scenario.arm(), library.columns(), category=scenario.category)
+selector = lic.make_selector("gp", library.columns())
 p_WG = scenario.sample_goal("evaluation", 24)
 trial = lic.run_trial(scenario, selector, "evaluation", 24, p_WG, attempts=2)
 

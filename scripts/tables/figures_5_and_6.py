@@ -30,7 +30,7 @@ def main() -> None:
         pair for pair, rows in trials.items() if len(rows) == 2 and rows[1].success
     )
     p_WG = scenario.sample_goal("evaluation", environment, goal)
-    selector = make_selector(args.method, scenario.arm(), library.columns(), category=args.category)
+    selector = make_selector(args.method, library.columns())
     if not isinstance(selector, LicSelector):
         parser.error(f"the figures show what LIC estimates; {args.method!r} estimates nothing")
     attempts = run_trial(scenario, selector, "evaluation", environment, p_WG, attempts=2)

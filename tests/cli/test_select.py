@@ -36,7 +36,7 @@ def test_after_a_failure_the_command_answers_as_lic_2_does(
     assert code == 0
     known = ExperienceLibrary(library)
     scenario, columns = known.scenario(), known.columns()
-    selector = make_selector("knn", scenario.arm(), columns, category=scenario.category)
+    selector = make_selector("knn", columns)
     starts = make_starts(scenario, scenario.sample_instance("evaluation", 0))
     row = np.flatnonzero(np.isclose(starts.grid.x0[:, 1:], list(START.values())).all(axis=1))
     begun = FailedReach.from_start(starts.grid[int(row[0])])

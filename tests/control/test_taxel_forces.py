@@ -8,7 +8,7 @@ from lic_drake.control.taxels import planar_taxels
 from lic_drake.robots.planar import planar_arm
 
 ARM = planar_arm()
-LAYOUT = planar_taxels(ARM.skin)
+LAYOUT = planar_taxels(ARM.skin, ARM.link_names)
 POSES = ARM.calc_pose(np.deg2rad([-30.0, 60.0, 50.0]))[:2]
 ANGLE = st.floats(-np.pi, np.pi)
 LINK = st.integers(0, 2)

@@ -47,7 +47,7 @@ def test_taxels_of_any_capsule_lie_on_its_surface_with_outward_unit_normals(
     axis, up = np.array([np.cos(angle), np.sin(angle), 0.0]), np.array([0.0, 0.0, 1.0])
     R_LC, p_LS = np.column_stack([up, np.cross(axis, up), axis]), np.append(p_LC, 0.0)
     skin = SkinShape(link="a", kind="capsule", size=(radius, length), R_LS=R_LC, p_LS=p_LS)
-    layout = planar_taxels((skin,), per_metre)
+    layout = planar_taxels((skin,), (skin.link,), per_metre)
     along = np.clip((layout.p_LT - p_LS) @ axis, -0.5 * length, 0.5 * length)
     nearest = p_LS + along[:, None] * axis
     np.testing.assert_allclose(np.linalg.norm(layout.n_L, axis=1), 1.0, atol=1e-12)

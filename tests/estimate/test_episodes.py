@@ -121,7 +121,14 @@ def test_what_is_missing_is_named(tmp_path, states, won):
     folder = write_lerobot(tmp_path / "set", {"file-000.parquet": without})
     with pytest.raises(LicError, match=r"no column next\.success; they have observation\.state"):
         read_episodes(folder)
-    (folder / "data" / "chunk-000" / "file-000.parquet").write_bytes(b"no table")
+    path = folder / "data" / "chunk-000" / "file-000.parquet"
+    pq.write_table(frames(states, won, [0, 1]).slice(1), path)
+    with pytest.raises(LicError, match=r"1 episodes of .* have no frame 0"):
+        read_episodes(folder)
+    pq.write_table(frames(states, won, [0, 1]).slice(0, 0), path)
+    with pytest.raises(LicError, match="has no episodes"):
+        read_episodes(folder)
+    path.write_bytes(b"no table")
     with pytest.raises(LicError, match="cannot read the frames of"):
         read_episodes(folder)
     file = write_robomimic(tmp_path / "rollouts.hdf5", states, won, rewards=False)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support.fake_reach import fill_library
-from support.starts import ARM, LINE
+from support.starts import LINE
 
 from lic_drake.estimate import gaussian_process
 from lic_drake.estimate.estimator import from_sklearn
@@ -35,7 +35,7 @@ def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def make(method: str, columns: dict[str, Any]) -> tuple[LicSelector, list[str]]:
     said: list[str] = []
-    selector = make_selector(method, ARM, columns, say=said.append)
+    selector = make_selector(method, columns, say=said.append)
     assert isinstance(selector, LicSelector)
     return selector, said
 

@@ -213,6 +213,8 @@ def test_what_cannot_be_evaluated_is_refused_before_any_reach(
     asked = evaluation(experience=copied, methods=("rnd",))
     run_evaluation(asked, say=quiet)
     calls.clear()
+    with pytest.raises(RequestError, match="goals must be at least 1, got 0"):
+        run_evaluation(replace(asked, goals=0), say=quiet)
     with pytest.raises(LibraryError, match="holds reaches of scenario"):
         run_evaluation(replace(asked, overrides="{stop: {timeout_s: 0.4}}"), say=quiet)
     # What a worker cannot read is an error here.

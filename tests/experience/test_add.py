@@ -103,6 +103,7 @@ def test_a_rejected_addition_leaves_the_library_unchanged(
     [
         ("rows.txt", "", ".csv or .parquet"),
         ("rows.csv", "success,goal_x\n1,0.6,3\n", "Expected 2 columns, got 3"),
+        ("rows.csv", "success,goal_x, goal_x\n1,0.6,0.7\n", "has 2 columns goal_x; keep one"),
         ("rows.parquet", "text", "cannot read .* as parquet"),
     ],
 )

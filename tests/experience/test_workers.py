@@ -13,7 +13,7 @@ from support.fake_reach import FakeReach, comparable, expected_records, make_req
 from support.light_tasks import count_threads, deaths_of, work
 
 from lic_drake.cli.main import main
-from lic_drake.errors import ClusterError
+from lic_drake.errors import ClusterError, PerceptionError
 from lic_drake.experience.check import check_library
 from lic_drake.experience.collect import collect
 from lic_drake.experience.runner import Progress, ReachFunction, Task, run_tasks
@@ -194,3 +194,16 @@ def test_dask_workers_that_join_later_are_used_and_a_lost_scheduler_loses_no_sha
         assert "lost the connection to the scheduler" in lost and "; finished env" in lost
     assert 12 <= collect(library, REQUEST, reach=reach).present < 36
     assert comparable(library.records()) == expected_records(REQUEST)
+
+
+def refuse(name: str) -> str:
+    if name == "a":
+        raise PerceptionError("no ball in view")
+    return name
+
+
+def test_what_only_one_environment_refuses_does_not_end_the_others() -> None:
+    finished: list[str] = []
+    tasks = [Task(name, (name,)) for name in "abc"]
+    failed = run_tasks(tasks, refuse, Workers(), lambda task, result: finished.append(result))
+    assert failed == {"a": "no ball in view"} and finished == ["b", "c"]

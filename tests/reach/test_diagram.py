@@ -25,7 +25,7 @@ def test_the_exported_ports_have_the_documented_names_and_sizes(
     diagram = reach_diagram.diagram
     inputs = [diagram.get_input_port(i) for i in range(diagram.num_input_ports())]
     outputs = [diagram.get_output_port(i) for i in range(diagram.num_output_ports())]
-    num_taxels = planar_taxels(SCENARIO.arm().skin).num_taxels
+    num_taxels = planar_taxels(SCENARIO.arm().skin, SCENARIO.arm().link_names).num_taxels
     assert {port.get_name(): port.size() for port in inputs} == {"goal": 3}
     assert {port.get_name(): port.size() for port in outputs} == {
         "arm_state": 6,

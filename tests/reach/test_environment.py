@@ -103,7 +103,8 @@ def test_traces_and_records_are_in_the_world(sleep: bool) -> None:
     record = make_record(request, result, 0.0)
     assert (record.base_x, record.base_y, record.after) == (0.0, -0.25, ())
     assert ReachRequest.from_record(record, scenario) == request
-    np.testing.assert_allclose(record.final, arm.tip_pose(trace.q[-1]) + b0, atol=1e-12)
+    x_final = [record.final_x, record.final_y, record.final_phi]
+    np.testing.assert_allclose(x_final, arm.tip_pose(trace.q[-1]) + b0, atol=1e-12)
     assert record.min_distance == np.linalg.norm(trace.p_WE - record.p_WG, axis=1).min()
     # Not that of another frame: the hand came from 0.33 m away.
     assert record.min_distance < 0.33

@@ -4,9 +4,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
+from pydrake.geometry import GeometryId, SceneGraph
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import BodyIndex
 from support.six_joint_arm import write
 
 from lic_drake.errors import ScenarioError
+from lic_drake.paths import robots_dir
 from lic_drake.reach.scenario import load_scenario, parse_scenario
 from lic_drake.robots.registry import get_robot
 
@@ -122,3 +127,41 @@ def test_joints_too_stiff_for_the_controller_are_refused(tmp_path: Path) -> None
     path = write(tmp_path, "stiffness: 30.0", "stiffness: 3000.0")
     with pytest.raises(ScenarioError, match="forearm_joint of six_joint_arm, 3000 Nm/rad, is too"):
         load_scenario(SPHERES, f"{{robot: {path}}}")
+    # A joint whose links carry no skin presses nothing, however stiff.
+    with pytest.raises(ScenarioError, match="iiwa_joint_2 of iiwa14, 5000 Nm/rad, is too"):
+        load_scenario(SPHERES, f"{{robot: {stiff_iiwa(tmp_path)}}}")
+
+
+def stiff_iiwa(folder: Path) -> Path:
+    content = yaml.safe_load((robots_dir() / "iiwa14.yaml").read_text())
+    content["model"] = str((robots_dir() / content["model"]).resolve())
+    content["skin_links"] = ["iiwa_link_3", "iiwa_link_4"]
+    content["joints"]["iiwa_joint_2"]["stiffness"] = 5000.0
+    (folder / "iiwa14.yaml").write_text(yaml.safe_dump(content))
+    return folder / "iiwa14.yaml"
+
+
+def test_the_pedestal_is_upright_however_the_arm_is_mounted(tmp_path: Path) -> None:
+    content = yaml.safe_load(stiff_iiwa(tmp_path).read_text())
+    content["base"]["rpy_deg"] = [0.0, 90.0, 0.0]
+    content["joints"]["iiwa_joint_2"]["stiffness"] = 50.0
+    (tmp_path / "iiwa14.yaml").write_text(yaml.safe_dump(content))
+    plant = MultibodyPlant(time_step=0.0)
+    graph = SceneGraph()
+    plant.RegisterAsSourceForSceneGraph(graph)
+    get_robot(str(tmp_path / "iiwa14.yaml")).add_to_plant(plant)
+    plant.Finalize()
+    (pedestal,) = (
+        g for g in all_geometries(plant) if "pedestal" in graph.model_inspector().GetName(g)
+    )
+    X_BP = graph.model_inspector().GetPoseInFrame(pedestal)
+    body = plant.GetBodyFromFrameId(graph.model_inspector().GetFrameId(pedestal))
+    X_WP = plant.EvalBodyPoseInWorld(plant.CreateDefaultContext(), body) @ X_BP
+    np.testing.assert_allclose(X_WP.rotation().matrix()[:, 2], [0.0, 0.0, 1.0], atol=1e-9)
+    np.testing.assert_allclose(X_WP.translation()[:2], content["base"]["xyz"][:2], atol=1e-9)
+    assert X_WP.translation()[2] < content["base"]["xyz"][2]
+
+
+def all_geometries(plant: MultibodyPlant) -> list[GeometryId]:
+    bodies = (plant.get_body(BodyIndex(i)) for i in range(plant.num_bodies()))
+    return [g for body in bodies for g in plant.GetCollisionGeometriesForBody(body)]

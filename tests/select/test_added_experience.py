@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from support.fake_reach import fill_library
-from support.starts import ARM
 
 from lic_drake.estimate.features import PLANAR_LIC1
 from lic_drake.experience.add import add_rows
@@ -50,7 +49,7 @@ def second(selector: object) -> Vector:
 def test_the_first_attempts_estimates_take_what_was_added_in(
     method: str, library: ExperienceLibrary
 ) -> None:
-    chosen = [make_selector(method, ARM, columns) for columns in without_and_with(library)]
+    chosen = [make_selector(method, columns) for columns in without_and_with(library)]
     models = [getattr(selector, "first", selector) for selector in chosen]
     models = [getattr(model, "first", model) for model in models]
     before, after = (model.estimator.values(QUERY)[0] for model in models)
@@ -58,9 +57,7 @@ def test_the_first_attempts_estimates_take_what_was_added_in(
 
 
 def test_the_second_attempts_estimates_learn_from_added_pairs(library: ExperienceLibrary) -> None:
-    before, after = (
-        second(make_selector("knn", ARM, columns)) for columns in without_and_with(library)
-    )
+    before, after = (second(make_selector("knn", columns)) for columns in without_and_with(library))
     # The added failure was followed by itself, which fails again, and by the success.
     assert after[0] == pytest.approx(0.5, abs=0.05)
     assert before[0] != pytest.approx(0.5, abs=0.05)

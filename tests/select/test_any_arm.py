@@ -33,7 +33,7 @@ def test_it_is_collected_for_and_selected_for_as_any_other(tmp_path: Path) -> No
     assert set(columns["robot"]) == {NAME} and 0 < columns["success"].sum() < 3
 
     arm = SCENARIO.arm()
-    selector = make_selector("knn", arm, columns, category=SCENARIO.category)
+    selector = make_selector("knn", columns)
     starts = make_starts(SCENARIO, SCENARIO.sample_instance("holdout", 0))
     p_WG = np.array([0.66, -0.3, 0.85])
     situation = Situation(p_WG=p_WG, starts=starts)
@@ -53,4 +53,4 @@ def test_it_is_collected_for_and_selected_for_as_any_other(tmp_path: Path) -> No
     again = selector.select(Situation(p_WG=p_WG, starts=starts, failed=failed)).start
     assert np.linalg.norm(again.x0[:3] - start.x0[:3]) > 0.1
     for method in ("rnd", "cost"):
-        assert make_selector(method, arm).select(situation).start.q is not None
+        assert make_selector(method).select(situation).start.q is not None

@@ -44,6 +44,8 @@ def test_what_yields_is_found_where_it_was_pushed_to() -> None:
     assert len(found.still) == 0 and trace.q_clutter is not None
     assert np.linalg.norm(trace.q_clutter[0] - [0.52, -0.05]) > 0.03
     np.testing.assert_allclose(found.pushed, trace.q_clutter, atol=0.015)
+    # A later reach that touches nothing does not make it forgotten.
+    np.testing.assert_array_equal(felt(trace, reach(make_clutter())).pushed, found.pushed)
 
 
 def test_nothing_is_where_the_arm_was() -> None:

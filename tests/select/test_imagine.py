@@ -98,7 +98,7 @@ def test_the_best_alternative_is_found_with_few_trials() -> None:
 def fail(scenario: Scenario, environment: int = 0) -> tuple[Situation, Attempt]:
     """A first attempt of COST that cannot succeed in time, and the situation after it."""
     p_WG = scenario.sample_goal("holdout", environment, 0)
-    cost = make_selector("cost", scenario.arm())
+    cost = make_selector("cost")
     (attempt,) = run_trial(scenario, cost, "holdout", environment, p_WG, attempts=1)
     starts = make_starts(scenario, scenario.sample_instance("holdout", environment))
     failed = (FailedReach.from_record(attempt.record, attempt.request),)
@@ -114,10 +114,8 @@ def test_a_further_attempt_is_chosen_in_imagined_environments(
     library = planar_library(tmp_path / "library", scenario)
     situation, attempt = fail(scenario)
     said: list[str] = []
-    learned = (library.columns(), None, category, said.append)
-    answers = [
-        make_selector("imagine", scenario.arm(), *learned).select(situation) for _ in range(2)
-    ]
+    learned = (library.columns(), None, said.append)
+    answers = [make_selector("imagine", *learned).select(situation) for _ in range(2)]
     assert [line for line in said if "imagining" in line] == [
         "imagining the clutter from what was felt: 5 reaches ..."
     ] * 2

@@ -3,12 +3,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.fake_reach import fill_library
-from support.starts import ARM, LINE
+from support.starts import LINE
 
 from lic_drake.errors import RequestError
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.reach.start import Start
-from lic_drake.robots.pr2 import pr2_arm
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.registry import (
     check_method,
@@ -33,7 +32,7 @@ def test_a_known_strategy_is_accepted_and_named_in_its_selections(
 ) -> None:
     check_method(method)
     assert needs_library(method) == (method not in ("rnd", "cost", "rnd>rnd"))
-    selector = make_selector(method, ARM, columns)
+    selector = make_selector(method, columns)
     assert selector.method == method
 
 
@@ -46,11 +45,11 @@ def test_an_unknown_strategy_is_refused_with_the_known_ones(method: str) -> None
 
 def test_what_learns_needs_a_library() -> None:
     with pytest.raises(RequestError, match="needs an experience library to learn from"):
-        make_selector("rnd>gp", ARM)
+        make_selector("rnd>gp")
 
 
 def test_only_the_plain_name_has_lic2(columns: dict[str, np.ndarray]) -> None:
-    both, first = make_selector("knn", ARM, columns), make_selector("knn1", ARM, columns)
+    both, first = make_selector("knn", columns), make_selector("knn1", columns)
     assert isinstance(both, LicSelector) and isinstance(first, LicSelector)
     assert first.second is None
     assert both.second is not None
@@ -63,7 +62,7 @@ def test_only_the_plain_name_has_lic2(columns: dict[str, np.ndarray]) -> None:
 
 
 def test_one_strategy_makes_the_first_attempt_and_another_all_later_ones() -> None:
-    selector = make_selector("rnd>cost", ARM)
+    selector = make_selector("rnd>cost")
     failed = tuple(FailedReach.from_start(Start(x0)) for x0 in LINE.grid.x0[:2])
     for n, method in enumerate(("rnd", "cost", "cost")):
         chosen = selector.select(Situation(p_WG=GOAL, starts=LINE, failed=failed[:n]))
@@ -75,6 +74,6 @@ def test_behind_a_board_there_is_no_lic_2() -> None:
     columns = {name: rng.uniform(-0.4, 0.4, n) for name in ("goal_y", "goal_z", "start_y")}
     columns |= {"start_z": rng.uniform(-0.4, 0.4, n), "success": rng.random(n) < 0.5}
     columns |= {"environment": np.arange(n) // 6, "stream": np.full(n, "training")}
-    category = "sphere-aperture-clutter"
-    selector = make_selector("knn", pr2_arm(), columns, category=category)
+    columns["category"] = np.full(n, "sphere-aperture-clutter")
+    selector = make_selector("knn", columns)
     assert isinstance(selector, LicSelector) and selector.second is None

@@ -24,7 +24,7 @@ GOAL_Y = "goal y [m]"
 
 def learn(library: ExperienceLibrary) -> tuple[Scenario, LicSelector]:
     scenario = library.scenario()
-    selector = make_selector("knn", scenario.arm(), library.columns(), category=scenario.category)
+    selector = make_selector("knn", library.columns())
     assert isinstance(selector, LicSelector)
     return scenario, selector
 

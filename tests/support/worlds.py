@@ -17,7 +17,7 @@ from lic_drake.robots.planar import planar_arm
 from lic_drake.scene.scene import Scene, SceneConfig, add_scene, make_simulator
 
 ARM = planar_arm()
-LAYOUT = planar_taxels(ARM.skin)
+LAYOUT = planar_taxels(ARM.skin, ARM.link_names)
 
 
 make_clutter = join
