@@ -39,7 +39,7 @@ tables: $(STAMP)
 	$(PYTHON_IN_VENV) scripts/tables/figures.py
 
 # The records themselves, from nothing in some hours; interrupted, it goes on where it was. What is
-# there is not simulated again: delete notebooks/results and models/experience for a new start.
+# there is not simulated again: delete the folders of records that are to be made anew.
 evaluation: $(STAMP)
 	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" scripts/run_evaluation.sh
 

@@ -3,6 +3,9 @@
 from functools import cache
 from pathlib import Path
 
+TRAINED = Path("learning", "reaches")
+"""The library that a folder of `lic train` holds."""
+
 
 @cache
 def models_dir() -> Path:
@@ -39,7 +42,12 @@ def shipped_libraries() -> list[Path]:
 
 
 def find_library(name_or_path: str | Path) -> Path:
-    """Returns the path of a library, or of the shipped one with that name if none exists there."""
+    """Returns the path of a library, or of the shipped one with that name if none exists there.
+
+    The library of a folder of `lic train` is that which it learned from.
+    """
     path = Path(name_or_path)
+    if (path / TRAINED).is_dir():
+        return path / TRAINED
     shipped = shipped_library(path.name)
     return shipped if path.name == str(path) and not path.exists() and shipped.is_dir() else path

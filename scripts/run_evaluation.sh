@@ -1,12 +1,13 @@
 #!/bin/sh
-# The 2-D evaluation at the paper's scale: libraries, trials, bounds. Takes some hours on two cores;
+# The evaluation at the paper's scale, of all arms: libraries, trials, bounds. Takes hours on two cores;
 # run again, it goes on where it was. `lic` and `python` must be those of the project.
 set -eu
 cd "$(dirname "$0")/.."
 results=notebooks/results
 
 lic collect models/experience/cylinder-clutter --environments 20
-for library in "passage-clutter 120" "cylinder-aperture-clutter 480" "sphere-aperture-clutter 40"; do
+for library in "passage-clutter 120" "cylinder-aperture-clutter 480" "sphere-aperture-clutter 40" \
+    "foliage-aperture-clutter 100"; do
     # shellcheck disable=SC2086
     set -- $library
     [ -e "models/experience/$1/training.parquet" ] ||
@@ -37,7 +38,7 @@ for category in "cylinder-clutter 200 10" "passage-clutter 2000 1" "cylinder-ape
     # Other second choices after LIC-1's failures.
     evaluate $category --methods gp1 'gp>cost' 'gp>rnd'
 done
-# Further attempts in imagined environments, which takes half a minute each.
+# Further attempts in imagined environments, which takes 8 s each.
 evaluate cylinder-clutter 50 10 --methods gp gp1 imagine --variant imagine
 # Five attempts.
 evaluate cylinder-clutter 50 10 --methods rnd cost gp --attempts 5 --variant five-attempts
@@ -65,6 +66,7 @@ choose cylinder-clutter 120 2 --methods gp knn
 choose passage-clutter 220 1 --methods gp knn
 choose cylinder-aperture-clutter 100 1 --methods gp knn
 choose sphere-aperture-clutter 80 1 --methods gp knn --set '{clutter: {num_blocked: 10}}'
+choose foliage-aperture-clutter 100 1 --methods gp
 choose iiwa14-sphere-aperture-clutter 80 1 --methods gp
 choose panda-sphere-aperture-clutter 80 1 --methods gp
 
@@ -76,13 +78,21 @@ evaluate_pr2() {
 evaluate_pr2
 # Further attempts in imagined environments, which takes most of a minute each.
 evaluate sphere-aperture-clutter 300 1 --methods imagine --set '{clutter: {num_blocked: 10}}'
+# What it learns from 250 to 9,540 reaches, collected from every start or where the estimate says so.
+learned=$results/learning_curve/sphere-aperture-clutter
+[ -e "$learned/training.parquet" ] || {
+    lic train out/pr2 --robot pr2 --set '{clutter: {num_blocked: 10}}' --reaches 5000
+    mkdir -p "$learned"
+    lic experience merge "$learned/training.parquet" out/pr2/learning/reaches
+}
+python scripts/learning_curve/collection.py
 evaluate_pr2 --still --variant still
 python scripts/bounds/run.py sphere-aperture-clutter --environments 100 --still \
     --set '{clutter: {num_blocked: 10}}'
 python scripts/bounds/race.py sphere-aperture-clutter --environments 300
 # Other arms, on pedestals that move.
 for arm in iiwa14 panda; do
-    evaluate $arm-sphere-aperture-clutter 150 1 --methods rnd cost gp 'gp>cost'
+    evaluate $arm-sphere-aperture-clutter 150 1 --methods rnd cost gp 'gp>cost' imagine
     python scripts/bounds/race.py $arm-sphere-aperture-clutter --environments 150
 done
 

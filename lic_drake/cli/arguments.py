@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
-from lic_drake.config import read_mapping
+from lic_drake.config import merge, read_mapping
 from lic_drake.errors import remark
 from lic_drake.paths import find_library
 
@@ -80,18 +80,19 @@ _SHARED: dict[str, dict[str, Any]] = {
         "type": float,
         "nargs": "+",
         "help": "goal in metres, X Y in the plane, X Y Z in space; x points into the clutter"
-        " (default: lic reach takes the environment's goal, else 0.6 0)",
+        " (default: the environment's goal where it has one, else 0.6 0)",
     },
     "--method": {
         "metavar": "NAME",
         "default": "gp",
-        "help": "selection strategy: rnd, cost, knn or gp (default: %(default)s)",
+        "help": "selection strategy: rnd, cost, knn, gp, or imagine: gp, then starts tried in"
+        " imagined clutter (default: %(default)s)",
     },
     "--library": {
         "metavar": "NAME|FOLDER",
         "type": find_library,
-        "help": "experience library: a folder, or the name of a shipped one (default: shipped ones;"
-        f" for lic select and lic evaluate {DEFAULT_SCENARIO})",
+        "help": "experience library: a folder, that of a training, or the name of a shipped one"
+        f" (default: the shipped one of the category, {DEFAULT_SCENARIO} where none is named)",
     },
     "--seed": {
         "metavar": "N",
@@ -179,11 +180,12 @@ def category_of(robot: str) -> str:
 
 
 def overrides_of(given: str, category: str) -> str:
-    """Returns the YAML text of --set; before spheres, where it is empty, some apertures are closed.
+    """Returns the YAML text of --set; before spheres some apertures are closed unless it says so.
 
     With all of them open the best start is too often the one that is straight before the goal.
     """
-    return given or ("{clutter: {num_blocked: 8}}" if category == CATEGORIES[3] else "")
+    closed = {"clutter": {"num_blocked": 8}} if category == CATEGORIES[3] else {}
+    return yaml.safe_dump(merge(closed, read_mapping(given, "--set"))) if closed else given
 
 
 def with_robot(overrides: str, robot: str) -> str:

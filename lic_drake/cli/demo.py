@@ -45,7 +45,8 @@ def add_parser(subparsers: Subparsers) -> None:
         "--seed",
         metavar="N",
         type=whole_number(0),
-        help="environment, and seed of random choices (default: one that takes two attempts)",
+        help="environment, and seed of random choices (default: for most libraries one that takes"
+        " two attempts)",
     )
     parser.add_argument(
         "--visuals",

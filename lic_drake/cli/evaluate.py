@@ -34,8 +34,8 @@ def add_parser(subparsers: Subparsers) -> None:
         nargs="+",
         default=["rnd", "cost", "gp", "knn"],
         metavar="NAME",
-        help="rnd, cost, gp, knn; gp1 uses LIC-1 for all attempts, gp>cost LIC-1 for the first and"
-        " COST for later ones (default: rnd cost gp knn)",
+        help="rnd, cost, gp, knn, imagine; gp1 uses LIC-1 for all attempts, gp>cost LIC-1 for the"
+        " first and COST for later ones (default: rnd cost gp knn)",
     )
     add_count(parser, "--environments", 200, "number of environments")
     add_count(parser, "--goals", 1, "goals per environment")

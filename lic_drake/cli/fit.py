@@ -26,9 +26,9 @@ def add_parser(subparsers: Subparsers) -> None:
         " the table has, and the probability, with its 90 % interval, that choices with such an"
         " estimate succeed. Those choices are attempts of the table: a fifth of the scenes at a"
         " time is not learned from; of five or more attempts of it in like situations, the one with"
-        " the highest estimate is a choice. The interval holds what their number leaves open, not"
-        " that the best of all decisions may be better or worse than the best of those few. Without"
-        " --at it only says what was learned.",
+        " the highest estimate is a choice. The interval reflects only how few these choices are,"
+        " not how far the best of all decisions differs from the best of those few: tried on 52"
+        " made-up tables it held the true rate in 34. Without --at it only says what was learned.",
         "lic fit rollouts.parquet --decide base_x base_y --given object_x object_y --group scene"
         " --at object_x=0.4 object_y=0.6 --map map.png",
         ["--json"],
@@ -38,7 +38,7 @@ def add_parser(subparsers: Subparsers) -> None:
         metavar="FILE",
         type=Path,
         help=".csv or .parquet file of attempts, folder of a LeRobot data set or .hdf5 file of a"
-        " robomimic one, of which what was seen first is a column for each number",
+        " robomimic one; each number of an episode's first observation becomes a column",
     )
     for name, what in (
         ("--decide", "columns with what was decided"),

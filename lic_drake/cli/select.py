@@ -42,8 +42,8 @@ def add_parser(subparsers: Subparsers) -> None:
         "--least",
         metavar="P",
         type=float,
-        help="probability of success below which the answer is not to reach from here, the price of"
-        " an attempt by what a success is worth (default: none)",
+        help="smallest probability of success that is worth an attempt: the price of an attempt"
+        " divided by the worth of a success; below it worth_trying is false (default: none)",
     )
 
 

@@ -9,6 +9,7 @@ from lic_drake.evaluate.trial import Evaluation, run_evaluation
 from lic_drake.evaluate.trials import TrialRow
 from lic_drake.experience.store import ExperienceLibrary
 from lic_drake.experience.workers import Workers
+from lic_drake.paths import TRAINED
 from lic_drake.reach.scenario import load_scenario
 
 LEARNING, BEGINNING = 0.6, 0.95
@@ -29,7 +30,7 @@ METHODS = ("rnd", "cost", "gp")
 
 def training_library(folder: Path) -> ExperienceLibrary:
     """Returns the library that a training in a folder learns from."""
-    return ExperienceLibrary(folder / "learning" / "reaches")
+    return ExperienceLibrary(folder / TRAINED)
 
 
 def train(

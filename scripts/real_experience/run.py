@@ -44,7 +44,7 @@ class Learned:
     """What an estimator learned from.
 
     Attributes:
-        records: Number of records of the real robot, the first ones.
+        records: Number of records of the other world, the first ones.
         weight: How many simulated reaches each counts as; None: without any simulation.
     """
 
@@ -131,7 +131,7 @@ def draw_success(ax: Axes, counts: dict[Learned, Count], random: Count) -> None:
         ends = [line[size].interval() for size in sizes]
         low = [r - 100.0 * end[0] for r, end in zip(rate, ends, strict=True)]
         high = [100.0 * end[1] - r for r, end in zip(rate, ends, strict=True)]
-        learned = "real records only" if weight is None else "simulation and records of weight"
+        learned = "these records only" if weight is None else "simulation and records of weight"
         label = learned if weight is None else f"{learned} {weight:g}"
         # Lines beside each other: intervals of equal sizes would hide one another.
         at = [size * 1.03 ** weights.index(weight) for size in sizes]
@@ -142,13 +142,13 @@ def draw_success(ax: Axes, counts: dict[Learned, Count], random: Count) -> None:
     ax.set_xticks(sizes, [str(size) for size in sizes])
     ax.minorticks_off()
     ax.set_xlim(-15.0, 1.2 * max(sizes))
-    ax.set(ylim=(0.0, None), xlabel="records of the real robot", ylabel="success of LIC-1 [%]")
+    ax.set(ylim=(0.0, None), xlabel="records of the other world", ylabel="success of LIC-1 [%]")
     ax.legend(fontsize=8, loc="lower right")
 
 
 def main() -> None:
     parser = make_parser(__doc__)
-    parser.add_argument("--records", type=int, default=2000, help="records of the real robot")
+    parser.add_argument("--records", type=int, default=2000, help="records of the other world")
     parser.add_argument("--sizes", type=int, nargs="+", default=[100, 300, 1000, 2000])
     parser.add_argument("--weights", type=float, nargs="+", default=[1.0, 8.0])
     parser.add_argument(

@@ -47,7 +47,7 @@ def test_every_picture_of_the_readmes_is_made_by_a_script() -> None:
 
 def test_captions_tell_the_outcomes() -> None:
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert "looks at foliage, gets stuck in it, chooses another start, and reaches](" in readme
+    assert "reaches into foliage, gets stuck, starts elsewhere, and reaches](" in readme
     assert outcomes("foliage") == ["stuck", "reached"]
     assert "before and after a failure | the two attempts |" in readme
     assert outcomes("planar")[1:] == ["reached"] and outcomes("planar")[0] != "reached"
