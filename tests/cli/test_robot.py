@@ -6,9 +6,12 @@ from pathlib import Path
 import pytest
 from support.six_joint_arm import write
 
+from lic_drake.cli.arguments import overrides_of
 from lic_drake.cli.main import main
+from lic_drake.config import read_mapping
 from lic_drake.evaluate.trials import read_trials
 from lic_drake.experience.store import ExperienceLibrary
+from lic_drake.paths import find_library
 
 
 @pytest.mark.usefixtures("_renderer")
@@ -41,6 +44,7 @@ def test_training_leaves_a_library_a_table_and_a_demonstration(
     assert main(["train", str(tmp_path), "--reaches", "12", *brief, "--json"]) == 0
     values = json.loads(capsys.readouterr().out)
     reaches = ExperienceLibrary(values["library"]).columns()
+    assert find_library(tmp_path) == Path(values["library"])
     # Two environments with four goals by COST, or one more that was begun.
     count = values["reaches"]
     assert len(reaches["key"]) == count and count in (8, 12)
@@ -52,3 +56,13 @@ def test_training_leaves_a_library_a_table_and_a_demonstration(
     }
     assert "| gp | 2 |" in Path(values["table"]).read_text()
     assert Path(values["demo"]).stat().st_size > 10_000
+
+
+def test_before_spheres_apertures_are_closed_unless_their_number_is_given() -> None:
+    def closed(text: str, category: str = "sphere-aperture-clutter") -> object:
+        values = read_mapping(overrides_of(text, category), "--set")
+        return values.get("clutter", {}).get("num_blocked")
+
+    assert closed("") == closed("{stop: {timeout_s: 9}}") == closed("{clutter: {columns: 5}}") == 8
+    assert closed("{clutter: {num_blocked: 0}}") == 0
+    assert closed("", "cylinder-clutter") is None
