@@ -12,6 +12,7 @@ from matplotlib.patheffects import withStroke
 from lic_drake.evaluate.trial import Attempt
 from lic_drake.select.lic import LicSelector
 from lic_drake.select.objective import SuccessObjective
+from lic_drake.select.situation import Situation
 from lic_drake.show.figures import attempts_figure, estimate_title, situation_before
 from lic_drake.starts import BoardStarts
 from lic_drake.types import Vector
@@ -30,7 +31,7 @@ def apertures_figure(
 
     def draw(ax: Axes, number: int) -> None:
         attempt, situation = attempts[number - 1], situation_before(attempts, number, starts)
-        values = estimate_apertures(selector.objective(situation), starts)
+        values = estimate_apertures(selector.objective(situation), situation)
         chosen = nearest_aperture(starts, attempt)
         draw_aperture_map(ax, starts, values, situation.p_WG, chosen)
         ax.set_title(estimate_title(selector, number, attempt), fontsize=10)
@@ -38,15 +39,19 @@ def apertures_figure(
     return attempts_figure(len(attempts), 6.0, draw)
 
 
-def estimate_apertures(objective: SuccessObjective, starts: BoardStarts) -> Vector:
+def estimate_apertures(objective: SuccessObjective, situation: Situation) -> Vector:
     """Returns the highest estimate over base and torso at each open aperture, `starts.p_WA`.
 
-    It includes the probability that the aperture is open. NaN where there is no feasible start.
+    It includes the probability that the aperture is open. NaN where there is no feasible start away
+    from those that failed.
     """
-    values = np.clip(objective.values(starts.grid), 0.0, 1.0) * starts.chance(starts.grid.x0)
+    starts = situation.starts
+    assert isinstance(starts, BoardStarts)
+    grid = starts.grid.take(situation.allowed(starts.grid))
+    values = np.clip(objective.values(grid), 0.0, 1.0) * starts.chance(grid.x0)
     best = np.full(len(starts.p_WA), np.nan)
     for i, p_WA in enumerate(starts.p_WA):
-        here = np.all(np.isclose(starts.grid.x0[:, :3], p_WA), axis=1)
+        here = np.all(np.isclose(grid.x0[:, :3], p_WA), axis=1)
         if np.any(here):
             best[i] = values[here].max()
     return best

@@ -55,8 +55,8 @@ def _draw_map(
 ) -> None:
     """Draws the passable-probability map over the head camera's image."""
     belief, attempt = observer.belief(number - 1), attempts[number - 1]
-    objective = selector.objective(situation_before(attempts, number, belief.starts))
-    values = belief.over_all(estimate_apertures(objective, belief.starts))
+    situation = situation_before(attempts, number, belief.starts)
+    values = belief.over_all(estimate_apertures(selector.objective(situation), situation))
     image, found = belief.head, belief.apertures
     draw_image(ax, image)
     chosen = int(belief.open_index[nearest_aperture(belief.starts, attempt)])

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgba
@@ -10,6 +12,7 @@ from lic_drake.perception.goal import DetectedGoal
 from lic_drake.reach.scenario import load_scenario
 from lic_drake.reach.start import Starts
 from lic_drake.select.objective import Objective
+from lic_drake.select.situation import FailedReach, Situation
 from lic_drake.show.apertures import draw_aperture_map, estimate_apertures
 from lic_drake.show.detections import STATE_COLORS, draw_apertures, draw_goal
 from lic_drake.starts import board_starts
@@ -37,12 +40,28 @@ class HeightAlone(Objective):
 
 def test_the_estimate_of_an_aperture_is_the_best_from_there_as_a_probability() -> None:
     objective = HeightAlone(model=None, p_WG=np.zeros(3))  # type: ignore[arg-type]
-    best = estimate_apertures(objective, STARTS)
+    best = estimate_apertures(objective, Situation(p_WG=np.zeros(3), starts=STARTS))
     reachable = np.array(
         [np.any(np.all(np.isclose(STARTS.grid.x0[:, :3], p), axis=1)) for p in STARTS.p_WA]
     )
     np.testing.assert_allclose(best[reachable], np.clip(STARTS.p_WA[reachable, 2], 0.0, 1.0))
     assert np.all(np.isnan(best[~reachable]))
+
+
+def test_what_failed_is_no_longer_estimated() -> None:
+    class First(Objective):
+        """Hopes for the first start alone."""
+
+        def values(self, conditions: Starts) -> np.ndarray:
+            return np.all(np.isclose(conditions.x0, STARTS.grid.x0[0]), axis=1) * np.all(
+                np.isclose(conditions.b0, STARTS.grid.b0[0]), axis=1
+            )
+
+    objective = First(model=None, p_WG=np.zeros(3))  # type: ignore[arg-type]
+    before = Situation(p_WG=np.zeros(3), starts=STARTS)
+    after = replace(before, failed=(FailedReach.from_start(STARTS.grid[0]),))
+    assert np.nanmax(estimate_apertures(objective, before)) == 1.0
+    assert np.nanmax(estimate_apertures(objective, after)) == 0.0
 
 
 def test_open_apertures_are_the_brighter_the_more_passable_and_the_chosen_one_is_framed() -> None:
