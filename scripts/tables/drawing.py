@@ -195,7 +195,7 @@ def draw_success_by_attempts(ax: Axes, counts: Mapping[str, Sequence[Count]]) ->
     most = max((len(results) for results in counts.values()), default=0)
     ax.set_xticks(range(1, most + 1))
     ax.set(xlabel="attempts", ylabel="success within them [%]")
-    ax.legend(fontsize=8, loc="lower right")
+    ax.legend(fontsize=8, loc="best")
     return ax
 
 
