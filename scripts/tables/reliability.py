@@ -16,10 +16,17 @@ from lic_drake.paths import shipped_library
 from lic_drake.types import BoolVector, Vector
 from scripts.common import run_tables, write_tables
 
-CATEGORIES = (
-    *("cylinder-clutter", "passage-clutter", "cylinder-aperture-clutter"),
-    "sphere-aperture-clutter",
-)
+CATEGORIES = {
+    "cylinder-clutter": "",
+    "passage-clutter": "",
+    "cylinder-aperture-clutter": "",
+    "sphere-aperture-clutter": "",
+    "iiwa14-sphere-aperture-clutter": "",
+    "panda-sphere-aperture-clutter": "",
+    "foliage-aperture-clutter": "known-foliage",
+}
+"""Libraries, and the variant of the trials by what was learned from each."""
+
 LEAST = (0.1, 0.2, 0.3, 0.5)
 """Probabilities below which a robot might refuse."""
 
@@ -29,12 +36,12 @@ _DRAWS = 2000
 def tabulate(results: Path) -> list[Table]:
     """Returns both tables: successes expected and observed, and what refusing would have meant."""
     expected, refused = [], []
-    for category in CATEGORIES:
+    for category, variant in CATEGORIES.items():
         known = read_trials(shipped_library(category) / FOLDER / "trials.parquet")
         tried = read_trials(results / category / "trials.parquet")
         for method, attempt in product(("gp", "knn"), (1, 2)):
             reliability = reliability_of(known, method, attempt)
-            estimates, successes = choices(tried, method, attempt)
+            estimates, successes = choices(tried, method, attempt, variant)
             if reliability is None:
                 continue
             p, (low, high) = reliability.probabilities(estimates), spread(reliability, estimates)

@@ -8,7 +8,7 @@ from scripts.tables import reliability
 
 
 def test_what_was_expected_stands_beside_what_came(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reliability, "CATEGORIES", ("sphere-aperture-clutter",))
+    monkeypatch.setattr(reliability, "CATEGORIES", {"sphere-aperture-clutter": ""})
     expected, refused = reliability.tabulate(Path("notebooks/results"))
     rows = {row[1:3]: row for row in expected.rows if row is not None}
     for method, won in (("gp", "213"), ("knn", "208")):  # As in table_pr2.md.
