@@ -73,11 +73,14 @@ def test_after_an_interrupted_or_killed_collector_the_same_request_resumes(
     start: Start,
     end: signal.Signals,
 ) -> None:
-    process = start(library.path, replace(reach, sleep_s=0.1), *options)
+    hold = library.path.with_name("hold")
+    process = start(library.path, replace(reach, sleep_s=0.1, hold=hold), *options)
     wait_until(lambda: any(library.path.glob("*.parquet")))
+    hold.touch()  # However slow the machine is, the collection does not end before the signal.
     # Ctrl-C reaches the whole process group.
     (os.killpg if end == signal.SIGINT else os.kill)(process.pid, end)
     error = process.communicate(timeout=60)[1]
+    hold.unlink()
     if end == signal.SIGINT:
         assert process.returncode == 130
         hint = "finished environments are kept, run the same command to resume"
