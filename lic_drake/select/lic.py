@@ -137,7 +137,7 @@ class LicSelector:
             # A candidate just beside the end of a region is one that nothing can improve.
             if region >= 0:
                 best.consider(self.improve(program, regions[region], start))
-        if not len(starts.grid):
+        if best.start is None and not len(starts.grid):
             raise RequestError("no discrete start is feasible here")
         if best.start is None:
             raise RequestError(

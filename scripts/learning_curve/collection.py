@@ -1,4 +1,4 @@
-"""Measures how much experience the PR2 needs, collected at random or where the estimate says so.
+"""Measures how much experience the PR2 needs, from every start or where the estimate says so.
 
 python scripts/learning_curve/collection.py
 """
@@ -18,7 +18,7 @@ from scripts.common import add_results, add_workers, make_parser, run_script
 CATEGORY = "sphere-aperture-clutter"
 BLOCKED = "{clutter: {num_blocked: 10}}"
 SIZES = {"active": (250, 1000, 3000), "random": (250, 1000, 3000, 9540)}
-"""Numbers of reaches, by how they were collected."""
+"""Numbers of reaches: of an active collection, or of random environments and every start there."""
 
 
 def folder_of(results: Path) -> Path:
