@@ -80,7 +80,7 @@ _SHARED: dict[str, dict[str, Any]] = {
         "type": float,
         "nargs": "+",
         "help": "goal in metres, X Y in the plane, X Y Z in space; x points into the clutter"
-        " (default: the environment's goal where it has one, else 0.6 0)",
+        " (default: none for lic select, which needs it; else the environment's, or 0.6 0)",
     },
     "--method": {
         "metavar": "NAME",
